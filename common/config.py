@@ -1,0 +1,99 @@
+"""A service's configuration: a frozen dataclass, set by file, environment, flags, in that order.
+
+An unknown key is an error wherever it comes from. The file is TOML with a table a service, so that
+one file can configure a whole system. The variable of field `camera_fps` of `sim` is
+`AUTOCOMPLETE_SIM_CAMERA_FPS`, its flag `--camera-fps`.
+"""
+
+import dataclasses
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from common.topics import SERVICES
+
+ENV_PREFIX = "AUTOCOMPLETE_"
+
+C = TypeVar("C")
+
+
+class ConfigError(ValueError):
+    """A configuration that cannot be used; the text says which key, where, and what is allowed."""
+
+
+def _table_of(path: Path, service: str) -> dict[str, Any]:
+    try:
+        document = tomllib.loads(path.read_text())
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: not TOML: {error}") from None
+    for key, value in document.items():
+        if key not in SERVICES or not isinstance(value, dict):
+            raise ConfigError(f"{path}: {key!r} is no table of a service ({', '.join(SERVICES)})")
+    table: dict[str, Any] = document.get(service, {})
+    return table
+
+
+def _variables_of(environment: Mapping[str, str], service: str) -> dict[str, str]:
+    prefix = f"{ENV_PREFIX}{service.upper()}_"
+    return {
+        name.removeprefix(prefix).lower(): value
+        for name, value in environment.items()
+        if name.startswith(prefix)
+    }
+
+
+def load(
+    config_type: type[C],
+    service: str,
+    file: Path | None = None,
+    environment: Mapping[str, str] | None = None,
+    flags: Mapping[str, Any] | None = None,
+) -> C:
+    """The configuration of a service.
+
+    Args:
+        config_type: a frozen dataclass whose fields all have defaults.
+        service: the service's name.
+        file: a TOML file with a table for the service, or None.
+        environment: the process' variables (default: `os.environ`).
+        flags: values from the command line, by field; None means not given.
+
+    Raises:
+        ConfigError: on an unknown key or a value that does not fit.
+    """
+    sources: list[tuple[str, Mapping[str, Any]]] = []
+    if file is not None:
+        sources.append((str(file), _table_of(file, service)))
+    sources.append(
+        (
+            "the environment",
+            _variables_of(os.environ if environment is None else environment, service),
+        )
+    )
+    sources.append(("the flags", {k: v for k, v in (flags or {}).items() if v is not None}))
+
+    known = {field.name for field in dataclasses.fields(config_type)}  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    for origin, given in sources:
+        for key, value in given.items():
+            if key not in known:
+                raise ConfigError(
+                    f"{service}: {origin} sets {key!r}, which is unknown;"
+                    f" known are {', '.join(sorted(known))}"
+                )
+            try:
+                # Checked one by one, so that an error can say where the value came from.
+                msgspec.convert({key: value}, config_type, strict=False)
+            except (msgspec.ValidationError, ValueError) as error:
+                raise ConfigError(f"{service}: {origin} sets {key!r}: {error}") from None
+            values[key] = value
+    try:
+        return msgspec.convert(values, config_type, strict=False)
+    except (msgspec.ValidationError, ValueError) as error:
+        raise ConfigError(f"{service}: {error}") from None

@@ -1,0 +1,335 @@
+"""A service's place on the network: topics in, topics out, timers, questions, health.
+
+One thread, the one in `run`, calls the service's code: handlers need no locks and a core needs no
+threads. The network's callbacks only put payloads in boxes. A stream's box holds the newest payload
+only, so nothing queues; an event's box keeps order.
+"""
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from common import messages as m
+from common.bus import Bus, Publication, QueryFailedError, Request
+from common.clock import Clock, SystemClock, nanoseconds, seconds
+from common.log import RateLimited
+from common.topics import QUERIES, TOPICS, Delivery, Query, Topic, alive_key_of, key_of
+from common.version import VERSION
+
+EVENT_DEPTH = 256
+"""Events kept for a reader that is behind; beyond it the oldest go first."""
+QUESTION_DEPTH = 64
+HEALTH_PERIOD_S = 1.0
+LATENCY_SAMPLES = 1000
+ASK_TIMEOUT_S = 2.0
+
+Handler = Callable[[Any, int], None]
+"""Called with a valid message and the monotonic time of its arrival in ns."""
+
+log = logging.getLogger(__name__)
+
+
+class RefusedError(Exception):
+    """A request cannot be granted: the reason, and the field that is to blame if there is one."""
+
+    def __init__(self, error: str, field_name: str | None = None) -> None:
+        super().__init__(error)
+        self.field_name = field_name
+
+
+@dataclass
+class _Subscription:
+    topic: Topic
+    handler: Handler
+    box: deque[tuple[bytes, int]]
+    received: int = 0
+    rejected: int = 0
+
+
+@dataclass
+class _Server:
+    query: Query
+    handler: Callable[[Any, int], m.Payload]
+    box: deque[Request] = field(default_factory=lambda: deque(maxlen=QUESTION_DEPTH))
+
+
+@dataclass
+class _Timer:
+    period_ns: int
+    handler: Callable[[int], None]
+    due_ns: int
+    timed: bool
+
+
+class Node:
+    """One service of one vehicle on a bus.
+
+    Args:
+        bus: the network.
+        vehicle: the vehicle's name, part of every key.
+        service: this service's name, one of `common.topics.SERVICES`.
+        clock: the source of arrival times and stamps.
+    """
+
+    def __init__(self, bus: Bus, vehicle: str, service: str, clock: Clock | None = None) -> None:
+        self.bus = bus
+        self.vehicle = vehicle
+        self.service = service
+        self.clock: Clock = clock or SystemClock()
+        self._subscriptions: dict[str, _Subscription] = {}
+        self._servers: list[_Server] = []
+        self._timers: list[_Timer] = []
+        self._publications: dict[str, tuple[Publication, type[m.Message]]] = {}
+        self._sequence: dict[str, int] = {}
+        self._closers: list[Callable[[], None]] = []
+        self._wake = threading.Condition()
+        self._woken = False
+        self._latencies_s: deque[float] = deque(maxlen=LATENCY_SAMPLES)
+        self._warn = RateLimited(log, self.clock)
+        self._health_of_core: Callable[[], tuple[m.HealthState, str]] = lambda: ("ok", "")
+        self._health_since_ns = self.clock.monotonic_ns()
+
+    # --- what a service declares -----------------------------------------------------------------
+
+    def on(
+        self, topic_name: str, handler: Handler, *, depth: int | None = None, timed: bool = False
+    ) -> None:
+        """Have `handler(message, arrival_ns)` called with what arrives on a topic.
+
+        Args:
+            topic_name: a row of the table.
+            handler: called with valid messages only; invalid ones are dropped and counted.
+            depth: how many payloads wait at most; by default 1 for streams and commands (the newest
+                wins) and EVENT_DEPTH for events.
+            timed: whether this is the service's main step, whose duration `health` reports.
+        """
+        topic = TOPICS[topic_name]
+        if depth is None:
+            depth = EVENT_DEPTH if topic.delivery is Delivery.EVENT else 1
+        subscription = _Subscription(topic, self._timed(handler) if timed else handler, deque())
+        subscription.box = deque(maxlen=depth)
+        self._subscriptions[topic_name] = subscription
+
+        def receive(payload: bytes) -> None:
+            subscription.received += 1
+            subscription.box.append((payload, self.clock.monotonic_ns()))
+            self._notify()
+
+        self.bus.subscribe(key_of(self.vehicle, topic_name), receive, video=topic.is_video)
+
+    def answer(self, query_name: str, handler: Callable[[Any, int], m.Payload]) -> None:
+        """Have `handler(request, now_ns)` answer a query; it raises `RefusedError` to refuse."""
+        server = _Server(QUERIES[query_name], handler)
+        self._servers.append(server)
+
+        def receive(request: Request) -> None:
+            server.box.append(request)
+            self._notify()
+
+        self.bus.serve(key_of(self.vehicle, query_name), receive)
+
+    def every(
+        self, period_s: float, handler: Callable[[int], None], *, timed: bool = False
+    ) -> None:
+        """Have `handler(now_ns)` called at a fixed rate; ticks that are missed are not made up."""
+        period_ns = nanoseconds(period_s)
+        due_ns = self.clock.monotonic_ns() + period_ns
+        wrapped = self._timed_tick(handler) if timed else handler
+        self._timers.append(_Timer(period_ns, wrapped, due_ns, timed))
+
+    def publishes(self, *topic_names: str) -> None:
+        """Declare topics before their first message, so that readers find them at once."""
+        for name in topic_names:
+            topic = TOPICS[name]
+            publication = self.bus.publication(
+                key_of(self.vehicle, name),
+                topic.delivery,
+                m.encoding_of(topic.message),
+                video=topic.is_video,
+            )
+            self._publications[name] = (publication, topic.message)
+            self._sequence[name] = 0
+
+    def reports(self, health: Callable[[], tuple[m.HealthState, str]]) -> None:
+        """Have `health` name the state and detail that are published once a second."""
+        self._health_of_core = health
+
+    def on_close(self, closer: Callable[[], None]) -> None:
+        """Have `closer` called when the node closes, last declared first."""
+        self._closers.append(closer)
+
+    # --- what a service does ---------------------------------------------------------------------
+
+    def publish(self, topic_name: str, message: m.Message) -> None:
+        """Send a message; `seq` is set here, whatever the message holds."""
+        if topic_name not in self._publications:
+            self.publishes(topic_name)
+        publication, message_type = self._publications[topic_name]
+        if type(message) is not message_type:
+            raise TypeError(f"{topic_name} carries {message_type.__name__}, not {type(message)}")
+        sequence = self._sequence[topic_name]
+        self._sequence[topic_name] = sequence + 1
+        publication.put(m.encode(msgspec.structs.replace(message, seq=sequence)))
+
+    def ask(
+        self, query_name: str, request: m.Payload, timeout_s: float = ASK_TIMEOUT_S
+    ) -> m.Payload:
+        """Ask a query of this vehicle's services, waiting for the answer.
+
+        Raises:
+            RefusedError: if the server refuses.
+            QueryFailedError: if nobody answers in time.
+        """
+        query = QUERIES[query_name]
+        try:
+            data = self.bus.ask(
+                key_of(self.vehicle, query_name),
+                m.encode(request),
+                m.encoding_of(query.request),
+                timeout_s,
+            )
+        except QueryFailedError as failure:
+            if failure.payload is None:
+                raise
+            error = m.decode(failure.payload, m.QueryError)
+            raise RefusedError(error.error, error.field) from None
+        return m.decode(data, query.reply)
+
+    # --- running ---------------------------------------------------------------------------------
+
+    def run(self, stop: threading.Event) -> None:
+        """Serve until `stop` is set (wake it with `wake`)."""
+        self.bus.announce(alive_key_of(self.vehicle, self.service))
+        self.every(HEALTH_PERIOD_S, self._publish_health)
+        self.publishes(f"health/{self.service}")
+        while not stop.is_set():
+            self.spin()
+            wait_s = seconds(self._next_due_ns() - self.clock.monotonic_ns())
+            with self._wake:
+                if not self._woken and wait_s > 0:
+                    self._wake.wait(min(wait_s, HEALTH_PERIOD_S))
+                self._woken = False
+
+    def wake(self) -> None:
+        """End the current wait of `run`; safe from any thread, not from a signal handler."""
+        self._notify()
+
+    def spin(self) -> None:
+        """Handle everything that has arrived and every timer that is due, once."""
+        for subscription in self._subscriptions.values():
+            for _ in range(len(subscription.box)):
+                payload, arrival_ns = subscription.box.popleft()
+                self._deliver(subscription, payload, arrival_ns)
+        for server in self._servers:
+            while server.box:
+                self._answer(server, server.box.popleft())
+        for timer in tuple(self._timers):
+            now_ns = self.clock.monotonic_ns()
+            if now_ns >= timer.due_ns:
+                missed = (now_ns - timer.due_ns) // timer.period_ns
+                timer.due_ns += (missed + 1) * timer.period_ns
+                timer.handler(now_ns)
+
+    def close(self) -> None:
+        """Run the closers and leave the bus."""
+        for closer in reversed(self._closers):
+            closer()
+        self.bus.close()
+
+    # --- inside ----------------------------------------------------------------------------------
+
+    def _notify(self) -> None:
+        with self._wake:
+            self._woken = True
+            self._wake.notify()
+
+    def _next_due_ns(self) -> int:
+        return min(timer.due_ns for timer in self._timers)
+
+    def _deliver(self, subscription: _Subscription, payload: bytes, arrival_ns: int) -> None:
+        topic = subscription.topic
+        try:
+            message = m.decode(payload, topic.message)
+        except m.InvalidPayloadError as error:
+            subscription.rejected += 1
+            self._warn.warning(f"{topic.name}: invalid payload dropped: {error}")
+            return
+        subscription.handler(message, arrival_ns)
+
+    def _answer(self, server: _Server, request: Request) -> None:
+        try:
+            question = m.decode(request.payload, server.query.request)
+            reply = server.handler(question, self.clock.monotonic_ns())
+        except m.InvalidPayloadError as error:
+            refusal = m.QueryError(error=str(error), field=_field_in(str(error)))
+            request.refuse(m.encode(refusal), m.encoding_of(m.QueryError))
+        except RefusedError as error:
+            refusal = m.QueryError(error=str(error), field=error.field_name)
+            request.refuse(m.encode(refusal), m.encoding_of(m.QueryError))
+        else:
+            request.reply(m.encode(reply), m.encoding_of(server.query.reply))
+
+    def _timed(self, handler: Handler) -> Handler:
+        def timed(message: Any, arrival_ns: int) -> None:
+            begin_ns = self.clock.monotonic_ns()
+            handler(message, arrival_ns)
+            self._latencies_s.append(seconds(self.clock.monotonic_ns() - begin_ns))
+
+        return timed
+
+    def _timed_tick(self, handler: Callable[[int], None]) -> Callable[[int], None]:
+        def timed(now_ns: int) -> None:
+            handler(now_ns)
+            self._latencies_s.append(seconds(self.clock.monotonic_ns() - now_ns))
+
+        return timed
+
+    def _publish_health(self, now_ns: int) -> None:
+        elapsed_s = max(seconds(now_ns - self._health_since_ns), 1e-3)
+        self._health_since_ns = now_ns
+        rates: dict[str, float] = {}
+        for name, subscription in self._subscriptions.items():
+            rates[name] = subscription.received / elapsed_s
+            subscription.received = 0
+        state, detail = self._health_of_core()
+        p50, p99 = _percentiles(self._latencies_s)
+        self.publish(
+            f"health/{self.service}",
+            m.Health(
+                stamp=self.clock.utc_ns(),
+                seq=0,
+                service=self.service,
+                version=VERSION,
+                state=state,
+                detail=detail,
+                rates=rates,
+                rejected={name: s.rejected for name, s in self._subscriptions.items()},
+                latency_p50=p50,
+                latency_p99=p99,
+            ),
+        )
+
+
+def _percentiles(samples: Iterable[float]) -> tuple[float, float]:
+    values = np.fromiter(samples, dtype=float)
+    if values.size == 0:
+        return 0.0, 0.0
+    p50, p99 = np.percentile(values, [50, 99])
+    return float(p50), float(p99)
+
+
+def _field_in(error: str) -> str | None:
+    """The field that a msgspec error names: the first one after `$.` or in back-quotes."""
+    for opening, closings in (("`$.", ".[`"), ("field `", "`")):
+        _, found, rest = error.partition(opening)
+        if found:
+            end = min((rest.find(c) for c in closings if c in rest), default=len(rest))
+            return rest[:end]
+    word = error.split(" ", 1)[0]
+    return word if word.isidentifier() else None

@@ -1,0 +1,1 @@
+"""Worlds: one YAML a world under this folder, read by the simulator, operators and studies."""
