@@ -9,6 +9,8 @@ import sys
 from typing import NoReturn
 
 COMMANDS = {
+    "demo": "everything on this machine, flown by a simulated operator",
+    "up": "everything on this machine, for a person at the console or a pad",
     "run": "run one service, on this machine or any other",
     "router": "run a Zenoh router inside this process",
 }

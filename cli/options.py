@@ -4,6 +4,7 @@ import argparse
 import re
 from pathlib import Path
 
+from cli import launch
 from common.topics import DEFAULT_VEHICLE, VEHICLE_PATTERN
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -46,3 +47,26 @@ def add_network(parser: argparse.ArgumentParser) -> None:
         type=existing_file,
         help="Zenoh's own configuration, for certificates and the like (JSON5)",
     )
+
+
+def add_local_system(parser: argparse.ArgumentParser) -> None:
+    """Add what commands that start a whole system share."""
+    parser.add_argument(
+        "--vehicle", type=vehicle, default=DEFAULT_VEHICLE, help="its name in every key (drone0)"
+    )
+    parser.add_argument(
+        "--console-port", type=int, default=launch.CONSOLE_PORT, help="of the console's page (8080)"
+    )
+    parser.add_argument(
+        "--config", metavar="FILE", type=existing_file, help="TOML with a table a service"
+    )
+
+
+def require_free_console_port(port: int) -> None:
+    """See that the console can listen.
+
+    Raises:
+        ValueError: if somebody listens on `port` already.
+    """
+    if not launch.is_free(port):
+        raise ValueError(f"--console-port: port {port} is taken; name another, for example 8090")

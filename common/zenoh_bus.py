@@ -47,7 +47,7 @@ log = logging.getLogger(__name__)
 
 
 def _base_config(file: Path | None) -> zenoh.Config:
-    config: zenoh.Config = zenoh.Config.from_file(str(file)) if file else zenoh.Config()  # type: ignore[no-untyped-call]
+    config: zenoh.Config = zenoh.Config.from_file(str(file)) if file else zenoh.Config()
     return config
 
 

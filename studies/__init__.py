@@ -1,0 +1,1 @@
+"""What flights are measured by."""
