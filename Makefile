@@ -1,1 +1,91 @@
-PYTHON ?= python3.11
+# `make help` tells what there is. Everything installs into .venv, nothing outside this folder.
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3 || echo python3)
+VENV := .venv
+BIN := $(VENV)/bin
+CONSOLE := services/overlay/console
+PIP := $(BIN)/python -m pip install --disable-pip-version-check -c constraints.txt
+SCRIPTS := .ci/run deploy/install
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo up check test test-compose bench train lock docs format clean
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+# --- setting up ----------------------------------------------------------------------------------
+
+setup: $(VENV)/.services $(VENV)/.console ## install everything that flies into .venv
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; v >= (3, 11) or sys.exit("Python 3.11 or newer is needed, this is %d.%d: make PYTHON=/path/to/python3.11" % v)'
+	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+$(VENV)/.services: pyproject.toml constraints.txt | $(BIN)/python
+	@echo "Installing the services into $(VENV): about 300 MB once, one or two minutes"
+	$(PIP) -e '.[services]'
+	@touch $@
+
+# torch comes with this one: an extra that only training and its tests need.
+$(VENV)/.all: $(VENV)/.services
+	@echo "Installing tests, checks and training into $(VENV): about 400 MB once"
+	$(PIP) -e '.[services,training,test,check]'
+	@touch $@
+
+$(VENV)/.console: $(shell find $(CONSOLE) \( -name node_modules -o -name dist \) -prune -o -type f -print 2>/dev/null) | $(BIN)/python
+	@if ! command -v npm >/dev/null; then \
+	  echo "No Node.js here, so the console is its plain page; Node 20 or newer builds the full one"; \
+	elif [ -f $(CONSOLE)/package.json ]; then \
+	  echo "Building the console" \
+	  && if (cd $(CONSOLE) && npm ci --no-audit --no-fund && npm run build); then touch $@; \
+	     else echo "The console could not be built, see above; its plain page is used"; fi; \
+	fi
+
+# --- flying --------------------------------------------------------------------------------------
+
+demo: setup ## a simulated operator flies the track; the console is at http://localhost:8080
+	$(BIN)/autocomplete demo $(ARGS)
+
+up: setup ## everything on this machine, for you to fly
+	$(BIN)/autocomplete up $(ARGS)
+
+# --- proving -------------------------------------------------------------------------------------
+
+check: $(VENV)/.all ## lint, format and types, in under a minute
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/shellcheck $(SCRIPTS)
+
+test: setup $(VENV)/.all ## every test that is not slow, in under 15 minutes on two cores
+	$(BIN)/python -m pytest tests -m 'not slow' $(ARGS)
+
+test-compose: setup $(VENV)/.all ## the mission in containers; needs Docker
+	$(BIN)/python -m pytest tests/system/test_compose.py -m slow -s $(ARGS)
+
+bench: setup $(VENV)/.all ## rates and latencies of the whole chain, as a table
+	$(BIN)/python tests/performance/bench.py $(ARGS)
+
+# --- making --------------------------------------------------------------------------------------
+
+train: $(VENV)/.all ## train the model anew into models/
+	$(BIN)/autocomplete train $(ARGS)
+
+lock: $(BIN)/python ## renew constraints.txt to the newest versions that fit pyproject.toml
+	$(BIN)/python -m pip install --quiet pip-tools
+	$(BIN)/pip-compile --quiet --all-extras --strip-extras --upgrade --no-header --no-annotate \
+	  --no-emit-index-url --no-emit-trusted-host --no-emit-find-links \
+	  --output-file $(VENV)/compiled.txt pyproject.toml
+	@echo "# Every package at the version that was tested; renewed by 'make lock'." > constraints.txt
+	@sed -E '/^#/d; /^$$/d; /^autocomplete-teleoperation/d; s/\+cpu$$//' $(VENV)/compiled.txt >> constraints.txt
+	@echo "renewed constraints.txt; now: make test"
+
+docs: setup ## the pages that are made from the code
+	$(BIN)/autocomplete contract > docs/contract.md
+
+format: $(VENV)/.all ## put the code into its format
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean: ## remove what was made, and .venv
+	rm -rf $(VENV) build *.egg-info .mypy_cache .ruff_cache .hypothesis $(CONSOLE)/node_modules $(CONSOLE)/dist

@@ -5,6 +5,7 @@ Exit code 0 done, 1 failed, 2 wrong usage; an error is one line on stderr.
 
 import argparse
 import importlib
+import os
 import sys
 from typing import NoReturn
 
@@ -13,11 +14,24 @@ COMMANDS = {
     "up": "everything on this machine, for a person at the console or a pad",
     "run": "run one service, on this machine or any other",
     "router": "run a Zenoh router inside this process",
+    "topics": "the contract's table with live rates",
+    "echo": "a topic's messages as they come",
+    "alive": "whether a service runs, by the exit code",
+    "doctor": "what is installed, reachable and alive, and what to do about what is not",
+    "record": "what flies, into an MCAP file",
+    "contract": "print the wire contract, made from the code",
+    "train": "make the model that recognises primitives, and its card",
 }
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line that points to the help."""
+    """A parser whose errors are one line that points to the help.
+
+    Attributes:
+        words: what follows the command, for options that depend on other words.
+    """
+
+    words: tuple[str, ...] = ()
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and exit with 2."""
@@ -37,11 +51,16 @@ def main(arguments: list[str] | None = None) -> int:
     for name, text in COMMANDS.items():
         command = commands.add_parser(name, help=text, description=text)
         if arguments[:1] == [name]:
+            command.words = tuple(arguments[1:])
             # Only the command that runs is imported: a service starts no faster than its imports.
             importlib.import_module(f"cli.{name}").declare(command)
     options = parser.parse_args(arguments)
     try:
         return int(options.action(options))
+    except BrokenPipeError:
+        # The reader of a pipe has left; nothing is to be flushed to it at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except (ValueError, OSError) as error:
         sys.stderr.write(f"autocomplete {options.command}: {error}\n")
         return 2 if isinstance(error, ValueError) else 1

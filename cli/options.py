@@ -1,6 +1,8 @@
 """Options that several commands share."""
 
 import argparse
+import math
+import os
 import re
 from pathlib import Path
 
@@ -33,13 +35,51 @@ def existing_file(text: str) -> Path:
     return path
 
 
+def positive(text: str) -> int:
+    """A count of 1 or more.
+
+    Raises:
+        argparse.ArgumentTypeError: if it is not.
+    """
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r}: use a whole number from 1")
+    return int(text)
+
+
+def duration(text: str) -> float:
+    """A time in s, more than none.
+
+    Raises:
+        argparse.ArgumentTypeError: if it is not.
+    """
+    try:
+        duration_s = float(text)
+    except ValueError:
+        duration_s = math.nan
+    if not 0.0 < duration_s < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r}: use seconds, more than 0")
+    return duration_s
+
+
+def add_examples(parser: argparse.ArgumentParser, *commands: str) -> None:
+    """End a command's help with commands that work."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = "\n  ".join(["examples:", *commands])
+
+
 def add_network(parser: argparse.ArgumentParser) -> None:
-    """Add --vehicle, --connect and --zenoh-config."""
+    """Add --vehicle, --connect and --zenoh-config; the environment gives the first two."""
     parser.add_argument(
-        "--vehicle", type=vehicle, default=DEFAULT_VEHICLE, help="its name in every key (drone0)"
+        "--vehicle",
+        type=vehicle,
+        default=os.environ.get("AUTOCOMPLETE_VEHICLE") or DEFAULT_VEHICLE,
+        help=f"its name in every key ($AUTOCOMPLETE_VEHICLE or {DEFAULT_VEHICLE})",
     )
     parser.add_argument(
-        "--connect", metavar="ENDPOINT", default=DEFAULT_ENDPOINT, help=f"({DEFAULT_ENDPOINT})"
+        "--connect",
+        metavar="ENDPOINT",
+        default=os.environ.get("AUTOCOMPLETE_CONNECT") or DEFAULT_ENDPOINT,
+        help=f"the router's endpoint ($AUTOCOMPLETE_CONNECT or {DEFAULT_ENDPOINT})",
     )
     parser.add_argument(
         "--zenoh-config",

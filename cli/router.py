@@ -20,11 +20,24 @@ def declare(parser: argparse.ArgumentParser) -> None:
         default="tcp/[::]:7447",
         help="where to listen (tcp/[::]:7447); a file's own endpoints come first",
     )
+    opts.add_examples(
+        parser,
+        "autocomplete router",
+        "autocomplete router --listen tcp/127.0.0.1:7448",
+        "autocomplete router --config deploy/zenoh.json5",
+    )
     parser.set_defaults(action=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
     stop = stop_on_signals()
-    with zenoh.open(router_config(options.listen, options.config)):
+    try:
+        session = zenoh.open(router_config(options.listen, options.config))
+    except zenoh.ZError as error:
+        reason = str(error).split(" at /", 1)[0]
+        raise OSError(
+            f"cannot listen on {options.listen}: {reason}; name another with --listen"
+        ) from None
+    with session:
         stop.wait()
     return 0

@@ -2,7 +2,7 @@
 
 import argparse
 import dataclasses
-import sys
+from collections.abc import Sequence
 
 from cli import options as opts
 from common.run import config_type_of, run_service
@@ -16,7 +16,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--config", metavar="FILE", type=opts.existing_file, help="TOML with a table a service"
     )
-    service = next((word for word in sys.argv[2:] if word in SERVICES), None)
+    service = _service_in(getattr(parser, "words", ()))
     fields: list[str] = []
     if service is not None:
         group = parser.add_argument_group(f"configuration of {service}")
@@ -26,15 +26,36 @@ def declare(parser: argparse.ArgumentParser) -> None:
                 flag, dest=f"set_{field.name}", metavar="VALUE", help=f"({field.default})"
             )
             fields.append(field.name)
+    opts.add_examples(
+        parser,
+        "autocomplete run sim --camera-fps 15",
+        "autocomplete run overlay --connect tcp/192.168.1.20:7447",
+        "autocomplete run operator --config system.toml",
+        "autocomplete run localizer --help     # with its configuration",
+    )
     parser.set_defaults(action=_run, fields=fields)
 
 
+def _service_in(words: Sequence[str]) -> str | None:
+    """The service that is asked for; a service's name may also be an option's value."""
+    for before, word in zip(("", *words), words, strict=False):
+        if word in SERVICES and not (before.startswith("--") and "=" not in before):
+            return word
+    return None
+
+
 def _run(options: argparse.Namespace) -> int:
-    return run_service(
-        options.service,
-        options.vehicle,
-        options.connect,
-        options.config,
-        options.zenoh_config,
-        {name: getattr(options, f"set_{name}") for name in options.fields},
-    )
+    try:
+        return run_service(
+            options.service,
+            options.vehicle,
+            options.connect,
+            options.config,
+            options.zenoh_config,
+            {name: getattr(options, f"set_{name}") for name in options.fields},
+        )
+    except ModuleNotFoundError as error:
+        raise OSError(
+            f"{options.service} needs {error.name};"
+            f" install it with pip install -e '.[{options.service}]'"
+        ) from None

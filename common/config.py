@@ -9,6 +9,7 @@ import dataclasses
 import os
 import tomllib
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -76,7 +77,7 @@ def load(
             _variables_of(os.environ if environment is None else environment, service),
         )
     )
-    sources.append(("the flags", {k: v for k, v in (flags or {}).items() if v is not None}))
+    sources.append(("the command line", {k: v for k, v in (flags or {}).items() if v is not None}))
 
     known = {field.name for field in dataclasses.fields(config_type)}  # type: ignore[arg-type]
     values: dict[str, Any] = {}
@@ -89,7 +90,9 @@ def load(
                 )
             try:
                 # Checked one by one, so that an error can say where the value came from.
-                msgspec.convert({key: value}, config_type, strict=False)
+                checked = msgspec.convert({key: value}, config_type, strict=False)
+                if isinstance(number := getattr(checked, key), float) and not isfinite(number):
+                    raise ValueError(f"{number} is no number to work with")
             except (msgspec.ValidationError, ValueError) as error:
                 raise ConfigError(f"{service}: {origin} sets {key!r}: {error}") from None
             values[key] = value

@@ -1,0 +1,1 @@
+"""Who flies: the operator's sticks or the path they accepted."""

@@ -77,6 +77,27 @@ GOOD: dict[str, dict[str, Any]] = {
         "plant": "tum",
         "collisions": 0,
     },
+    "Image": {
+        **HEAD,
+        "width": 64,
+        "height": 48,
+        "format": "jpeg",
+        "data": b"\xff\xd8 not a whole picture \xff\xd9",
+        "intrinsics": [60.0, 60.0, 31.5, 23.5],
+        "distortion": [0.0, 0.0, 0.0, 0.0],
+        "capture": STAMP - 5_000_000,
+    },
+    "Health": {
+        **HEAD,
+        "service": "sim",
+        "version": "0.1.0",
+        "state": "ok",
+        "detail": "",
+        "rates": {"command": 50.0},
+        "rejected": {"command": 0},
+        "latency_p50": 0.001,
+        "latency_p99": 0.002,
+    },
 }
 
 _OUT_OF_RANGE: dict[str, dict[str, Any]] = {
@@ -89,6 +110,8 @@ _OUT_OF_RANGE: dict[str, dict[str, Any]] = {
     "Imu": {"seq": -1},
     "Range": {"min": -1.0},
     "VehicleStatus": {"battery": 3.0},
+    "Image": {"width": 0},
+    "Health": {"latency_p50": -1.0},
 }
 _FLOAT_FIELD: dict[str, str] = {
     "Stick": "vx",
@@ -98,6 +121,7 @@ _FLOAT_FIELD: dict[str, str] = {
     "Command": "vx",
     "Range": "range",
     "VehicleStatus": "battery",
+    "Health": "latency_p99",
 }
 
 

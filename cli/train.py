@@ -1,0 +1,134 @@
+"""`autocomplete train`: from simulated operators to a model file with its card."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from training.fit import Epoch
+    from training.train import Judged, Run
+
+PRESETS = ("shipped", "quick")
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument(
+        "--preset",
+        choices=PRESETS,
+        default="shipped",
+        help="how much to train on: shipped (about 10 minutes) or quick (under one minute)",
+    )
+    parser.add_argument("--seed", type=_seed, default=0, help="same seed, same model (0)")
+    parser.add_argument(
+        "--out",
+        metavar="FOLDER",
+        type=Path,
+        default=Path("models"),
+        help="where intent.onnx, its card README.md and its figures go (models/)",
+    )
+    parser.set_defaults(action=_run)
+
+
+def _seed(text: str) -> int:
+    seed = int(text)
+    if seed < 0:
+        raise argparse.ArgumentTypeError("a seed is 0 or more")
+    return seed
+
+
+class _Bars:
+    """Shows a training run."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._tasks: dict[str, TaskID] = {}
+
+    def generating(self, name: str, done: int, total: int) -> None:
+        self._show(f"operators: {name}", done, total)
+
+    def batch(self, done: int, total: int) -> None:
+        self._show("epoch", done, total)
+
+    def epoch(self, epoch: "Epoch", epochs: int) -> None:
+        self._show("training", epoch.number, epochs)
+        mark = " [green]best[/]" if epoch.is_best else ""
+        self._progress.console.print(
+            f"epoch {epoch.number:3d}  loss {epoch.training_loss:.3f}"
+            f"  validation loss {epoch.validation_loss:.3f}"
+            f"  accuracy {epoch.validation_accuracy:.3f}{mark}"
+        )
+
+    def _show(self, text: str, done: int, total: int) -> None:
+        if text not in self._tasks:
+            self._tasks[text] = self._progress.add_task(text, total=total)
+        self._progress.update(self._tasks[text], completed=done, total=total)
+
+
+def _run(options: argparse.Namespace) -> int:
+    try:
+        from training.train import train
+    except ModuleNotFoundError as error:
+        raise OSError(
+            f"{error.name} is missing; install it with pip install -e '.[training]'"
+        ) from None
+    console = Console()
+    columns = (
+        TextColumn("{task.description:24}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console) as progress:
+        run = train(options.preset, options.seed, options.out, _Bars(progress))
+    _report(console, run)
+    return 0
+
+
+def _report(console: Console, run: "Run") -> None:
+    whole = run.judged[0].whole
+    table = Table(title=f"{whole.count} primitives of {whole.operators} operators held out")
+    for heading in ("classifier", "accuracy", "weighted F1", "95 % interval"):
+        table.add_column(heading)
+    for after, _ in run.judged[0].early:
+        table.add_column(f"F1 {after:g} s")
+    table.add_column("ECE")
+    for judged in run.judged:
+        error = "-" if judged.calibration is None else f"{judged.calibration:.3f}"
+        table.add_row(
+            judged.name,
+            f"{judged.whole.accuracy:.3f}",
+            f"{judged.whole.f1:.3f}",
+            f"{judged.whole.interval[0]:.3f} to {judged.whole.interval[1]:.3f}",
+            *(f"{s.f1:.3f}" for _, s in judged.early),
+            error,
+        )
+    console.print(table)
+    for judged in run.judged:
+        console.print(_confusion(judged))
+    console.print(f"{run.path}  sha256 {run.sha256[:8]}  card {run.path.with_name('README.md')}")
+
+
+def _confusion(judged: "Judged") -> Table:
+    from training.generator.shapes import LABELS
+
+    table = Table(title=f"{judged.name}: was (rows), said (columns)")
+    table.add_column("")
+    for label in LABELS:
+        table.add_column(label, justify="right")
+    for label, row in zip(LABELS, judged.whole.confusion.tolist(), strict=True):
+        table.add_row(label, *(str(n) for n in row))
+    return table

@@ -1,0 +1,5 @@
+import sys
+
+from cli.main import main
+
+sys.exit(main(["run", "localizer", *sys.argv[1:]]))

@@ -1,0 +1,206 @@
+"""The error-state Kalman filter: where the body is, how it moves, and how well both are known.
+
+Nominal state: position and velocity (world), rotation (body to world), offsets of accelerometer
+and gyroscope (body). The error of the rotation is a small rotation in the world frame, applied on
+the left. One past pose, that of the key picture, is kept in the state ("stochastic cloning"), so
+that a displacement against it corrects both ends and a hover does not drift.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from common.clock import seconds
+from common.frames import Array
+
+GRAVITY_MPS2 = 9.81
+
+POSITION = slice(0, 3)
+VELOCITY = slice(3, 6)
+ROTATION = slice(6, 9)
+ACCEL_BIAS = slice(9, 12)
+GYRO_BIAS = slice(12, 15)
+KEY_POSITION = slice(15, 18)
+KEY_ROTATION = slice(18, 21)
+SIZE = 21
+
+_HISTORY = 64
+"""Past states kept: 0.32 s at 200 Hz, more than a picture takes to arrive."""
+
+
+def cross_matrix(vector: Array) -> Array:
+    """The 3x3 matrix that multiplies like `vector` x."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def rotation_by(vector_rad: Array) -> Array:
+    """The 3x3 rotation by a rotation vector."""
+    return np.asarray(Rotation.from_rotvec(vector_rad).as_matrix(), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What the filter believes of the inertial sensors, one sample's or one second's sigma."""
+
+    accel_mps2: float
+    accel_bias_walk_mps2: float
+    gyro_radps: float
+    gyro_bias_walk_radps: float
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The nominal pose at some stamp."""
+
+    stamp_ns: int
+    position_m: Array
+    rotation: Array
+
+
+class ErrorStateFilter:
+    """Inertial navigation with corrections.
+
+    Args:
+        stamp_ns: time of the start.
+        position_m: place at the start.
+        rotation: body to world at the start.
+        sigmas: (15,) standard deviations of position, velocity, rotation and both offsets.
+        noise: of the inertial sensors.
+    """
+
+    def __init__(
+        self, stamp_ns: int, position_m: Array, rotation: Array, sigmas: Array, noise: Noise
+    ) -> None:
+        self.stamp_ns = stamp_ns
+        self.position_m = position_m.copy()
+        self.velocity_mps = np.zeros(3)
+        self.rotation = rotation.copy()
+        self.accel_bias_mps2 = np.zeros(3)
+        self.gyro_bias_radps = np.zeros(3)
+        self.rate_radps = np.zeros(3)
+        self.covariance = np.zeros((SIZE, SIZE))
+        self.covariance[:15, :15] = np.diag(sigmas**2)
+        self.key_position_m = position_m.copy()
+        self.key_rotation = rotation.copy()
+        self._noise = noise
+        self._transition = np.eye(SIZE)
+        self._steps = 0
+        self._past_ns = np.full(_HISTORY, -1, dtype=np.int64)
+        self._past_position_m = np.zeros((_HISTORY, 3))
+        self._past_velocity_mps = np.zeros((_HISTORY, 3))
+        self._past_rotation = np.tile(np.eye(3), (_HISTORY, 1, 1))
+        self._past_rate_radps = np.zeros((_HISTORY, 3))
+        self._remember()
+
+    # --- time ------------------------------------------------------------------------------------
+
+    def predict(self, stamp_ns: int, rate_radps: Array, force_mps2: Array) -> None:
+        """Move on to `stamp_ns` by one sample of body rates and specific force."""
+        dt_s = seconds(stamp_ns - self.stamp_ns)
+        self.rate_radps = rate_radps - self.gyro_bias_radps
+        middle = self.rotation @ rotation_by(self.rate_radps * (0.5 * dt_s))
+        force = middle @ (force_mps2 - self.accel_bias_mps2)
+        acceleration = force - (0.0, 0.0, GRAVITY_MPS2)
+        self.position_m += self.velocity_mps * dt_s + acceleration * (0.5 * dt_s * dt_s)
+        self.velocity_mps += acceleration * dt_s
+        self.rotation = self.rotation @ rotation_by(self.rate_radps * dt_s)
+
+        transition = self._transition
+        transition[0, 3] = transition[1, 4] = transition[2, 5] = dt_s
+        transition[VELOCITY, ROTATION] = cross_matrix(force * -dt_s)
+        transition[VELOCITY, ACCEL_BIAS] = middle * -dt_s
+        transition[ROTATION, GYRO_BIAS] = middle * -dt_s
+        self.covariance = transition @ self.covariance @ transition.T
+        noise = self._noise
+        diagonal = np.einsum("ii->i", self.covariance)
+        diagonal[VELOCITY] += (noise.accel_mps2 * dt_s) ** 2
+        diagonal[ROTATION] += (noise.gyro_radps * dt_s) ** 2
+        diagonal[ACCEL_BIAS] += noise.accel_bias_walk_mps2**2 * dt_s
+        diagonal[GYRO_BIAS] += noise.gyro_bias_walk_radps**2 * dt_s
+        self.stamp_ns = stamp_ns
+        self._remember()
+
+    def at(self, stamp_ns: int) -> Snapshot | None:
+        """The nominal pose at a stamp, or None if it lies before what is remembered.
+
+        A stamp a little ahead of the newest sample is reached with the newest rates.
+        """
+        ages_ns = np.where(self._past_ns >= 0, stamp_ns - self._past_ns, -1)
+        if not np.any(ages_ns >= 0):
+            return None
+        index = int(np.argmin(np.where(ages_ns >= 0, ages_ns, np.iinfo(np.int64).max)))
+        dt_s = seconds(int(ages_ns[index]))
+        return Snapshot(
+            stamp_ns,
+            self._past_position_m[index] + self._past_velocity_mps[index] * dt_s,
+            self._past_rotation[index] @ rotation_by(self._past_rate_radps[index] * dt_s),
+        )
+
+    # --- corrections -----------------------------------------------------------------------------
+
+    def set_key(self, snapshot: Snapshot, extra_sigma_m: float) -> None:
+        """Keep the pose of `snapshot` as the key pose.
+
+        Args:
+            snapshot: a recent pose.
+            extra_sigma_m: what corrections against the last key leave unknown of the place.
+        """
+        self.covariance[0, 0] += extra_sigma_m**2
+        self.covariance[1, 1] += extra_sigma_m**2
+        self.key_position_m = snapshot.position_m.copy()
+        self.key_rotation = snapshot.rotation.copy()
+        clone = np.zeros((6, SIZE))
+        clone[0:3, POSITION] = clone[3:6, ROTATION] = np.eye(3)
+        clone[0:3, VELOCITY] = np.eye(3) * -self.age_s(snapshot.stamp_ns)
+        with_clone = np.eye(SIZE)
+        with_clone[15:21] = clone
+        self.covariance = with_clone @ self.covariance @ with_clone.T
+
+    def age_s(self, stamp_ns: int) -> float:
+        """How long ago a stamp was, on the time of the IMU."""
+        return seconds(self.stamp_ns - stamp_ns)
+
+    def surprise(self, residual: Array, jacobian: Array, noise: Array) -> float:
+        """The squared Mahalanobis length of a residual (m,), given (m, 21) and (m, m)."""
+        spread = jacobian @ self.covariance @ jacobian.T + noise
+        return float(residual @ np.linalg.solve(spread, residual))
+
+    def correct(self, residual: Array, jacobian: Array, noise: Array) -> None:
+        """Take a measurement in.
+
+        Args:
+            residual: measured minus expected, (m,).
+            jacobian: of the measurement by the error state, (m, 21).
+            noise: covariance of the measurement, (m, m).
+        """
+        cross = self.covariance @ jacobian.T
+        gain = np.linalg.solve(jacobian @ cross + noise, cross.T).T
+        self._inject(gain @ residual)
+        covariance = self.covariance - gain @ cross.T
+        self.covariance = 0.5 * (covariance + covariance.T)
+
+    def _inject(self, error: Array) -> None:
+        turn = rotation_by(error[ROTATION])
+        self.position_m += error[POSITION]
+        self.velocity_mps += error[VELOCITY]
+        # Through scipy, the rotation stays one however often it is multiplied.
+        self.rotation = np.asarray(Rotation.from_matrix(turn @ self.rotation).as_matrix())
+        self.accel_bias_mps2 += error[ACCEL_BIAS]
+        self.gyro_bias_radps += error[GYRO_BIAS]
+        self.key_position_m += error[KEY_POSITION]
+        self.key_rotation = rotation_by(error[KEY_ROTATION]) @ self.key_rotation
+        ages_s = (self.stamp_ns - self._past_ns) * 1e-9
+        self._past_position_m += error[POSITION] - ages_s[:, None] * error[VELOCITY]
+        self._past_velocity_mps += error[VELOCITY]
+        self._past_rotation = turn @ self._past_rotation
+
+    def _remember(self) -> None:
+        slot = self._steps % _HISTORY
+        self._past_ns[slot] = self.stamp_ns
+        self._past_position_m[slot] = self.position_m
+        self._past_velocity_mps[slot] = self.velocity_mps
+        self._past_rotation[slot] = self.rotation
+        self._past_rate_radps[slot] = self.rate_radps
+        self._steps += 1

@@ -1,0 +1,264 @@
+"""Textures painted by rule: irregular everywhere, so that vision finds corners on all of them.
+
+Each is a square of PIXELS x PIXELS RGBA that repeats without a seam, unless it says otherwise.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from worlds import Texture
+
+PIXELS = 1024
+_SEED = 20210
+
+Picture = NDArray[np.uint8]
+_Field = NDArray[np.float32]
+_Rgb = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Paint:
+    """A texture and how large it is in the world.
+
+    Attributes:
+        picture: (PIXELS, PIXELS, 4), uint8, first row on top.
+        width_m: what one repetition measures; None fits the picture to each face.
+        height_m: the same, upwards.
+    """
+
+    picture: Picture
+    width_m: float | None
+    height_m: float | None
+
+
+def paint(texture: Texture) -> Paint:
+    """The paint of a texture; the same one each time."""
+    painter, width_m, height_m = _PAINTERS[texture]
+    names = sorted(_PAINTERS)
+    generator = np.random.default_rng([_SEED, names.index(texture)])
+    return Paint(painter(generator), width_m, height_m)
+
+
+def noise(generator: np.random.Generator, cells: int, octaves: int) -> _Field:
+    """Seamless cloudy noise in [0, 1], (PIXELS, PIXELS), from `cells` cells a side upwards."""
+    total: _Field = np.zeros((PIXELS, PIXELS), np.float32)
+    weight = 1.0
+    for octave in range(octaves):
+        side = min(PIXELS, cells << octave)
+        grid = generator.random((side, side), dtype=np.float32)
+        # A margin of the other side makes the enlarged picture meet itself.
+        margin = min(4, side)
+        wide = np.pad(grid, margin, mode="wrap")
+        scale = PIXELS // side
+        large = cv2.resize(wide, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+        begin = margin * scale
+        total += weight * large[begin : begin + PIXELS, begin : begin + PIXELS]
+        weight *= 0.55
+    low, high = np.percentile(total, [1.0, 99.0])
+    return np.clip((total - low) / (high - low), 0.0, 1.0).astype(np.float32)
+
+
+def _blend(low: _Rgb, high: _Rgb, share: _Field) -> _Field:
+    """The mix of two colours (0..1) by a field, (PIXELS, PIXELS, 3)."""
+    begin, end = np.asarray(low, np.float32), np.asarray(high, np.float32)
+    return begin + (end - begin) * share[..., None]
+
+
+def _picture(colour: _Field, alpha: _Field | None = None) -> Picture:
+    opaque = np.ones((PIXELS, PIXELS), np.float32) if alpha is None else alpha
+    whole = np.dstack([colour, opaque])
+    return np.asarray(np.clip(whole * 255.0, 0.0, 255.0), np.uint8)
+
+
+def _spots(
+    generator: np.random.Generator, colour: _Field, count: int, radius: tuple[int, int], rgb: _Rgb
+) -> None:
+    """Scatter filled spots of a colour, each a little lighter or darker, over the seam too."""
+    for _ in range(count):
+        x, y = generator.integers(0, PIXELS, 2)
+        size = int(generator.integers(radius[0], radius[1] + 1))
+        shade = np.asarray(rgb) * generator.uniform(0.75, 1.25)
+        for dx in (0, -PIXELS) if x + size >= PIXELS else (0,):
+            for dy in (0, -PIXELS) if y + size >= PIXELS else (0,):
+                cv2.circle(colour, (int(x) + dx, int(y) + dy), size, shade.tolist(), -1)
+
+
+def _asphalt(generator: np.random.Generator) -> Picture:
+    colour = _blend((0.21, 0.22, 0.24), (0.40, 0.41, 0.42), noise(generator, 8, 7))
+    colour *= 0.8 + 0.4 * generator.random((PIXELS, PIXELS, 1), dtype=np.float32)
+    # Stones of 1 to 4 cm, light and dark: what a camera 1 m above sees its motion by.
+    _spots(generator, colour, 900, (1, 4), (0.56, 0.55, 0.52))
+    _spots(generator, colour, 700, (1, 5), (0.12, 0.12, 0.13))
+    _spots(generator, colour, 60, (5, 10), (0.47, 0.44, 0.40))
+    for _ in range(7):
+        points = np.cumsum(generator.normal(0.0, 16.0, (14, 2)), axis=0)
+        points += generator.integers(200, PIXELS - 200, 2)
+        line = np.clip(points, 0, PIXELS - 1).astype(np.int32)
+        cv2.polylines(colour, [line], False, (0.1, 0.1, 0.11), 2)
+    return _picture(colour)
+
+
+def _grass(generator: np.random.Generator) -> Picture:
+    colour = _blend((0.17, 0.29, 0.09), (0.41, 0.53, 0.20), noise(generator, 8, 8))
+    for _ in range(9000):
+        x, y = generator.integers(0, PIXELS, 2)
+        dx, dy = generator.integers(-9, 10, 2)
+        green = generator.uniform(0.6, 1.4) * np.asarray((0.31, 0.45, 0.14))
+        cv2.line(colour, (int(x), int(y)), (int(x + dx), int(y + dy)), green.tolist(), 1)
+    _spots(generator, colour, 130, (2, 4), (0.85, 0.82, 0.55))
+    _spots(generator, colour, 60, (3, 8), (0.33, 0.26, 0.16))
+    return _picture(colour)
+
+
+def _concrete(generator: np.random.Generator) -> Picture:
+    colour = _blend((0.50, 0.50, 0.48), (0.72, 0.71, 0.68), noise(generator, 4, 8))
+    _spots(generator, colour, 500, (1, 4), (0.38, 0.38, 0.37))
+    # A warning band, as on the pillars of a car park.
+    rows = np.arange(PIXELS)[:, None] + np.arange(PIXELS)[None, :]
+    stripes = (rows // 128) % 2 == 0
+    band = np.zeros((PIXELS, PIXELS), bool)
+    band[640:896] = True
+    colour[band & stripes] = (0.95, 0.75, 0.05)
+    colour[band & ~stripes] = (0.08, 0.08, 0.08)
+    return _picture(colour)
+
+
+def _brick(generator: np.random.Generator) -> Picture:
+    colour = _blend((0.60, 0.58, 0.54), (0.72, 0.70, 0.66), noise(generator, 16, 6))
+    rows, columns = 16, 8
+    height, width = PIXELS // rows, PIXELS // columns
+    for row in range(rows):
+        for column in range(columns + 1):
+            x = column * width - (row % 2) * width // 2
+            # The halves that meet over the seam are one brick.
+            tone = np.random.default_rng([_SEED, row, column % columns]).uniform(0.75, 1.2)
+            corner = (x + width - 5, (row + 1) * height - 5)
+            red = tone * np.asarray((0.56, 0.26, 0.19))
+            cv2.rectangle(colour, (x + 5, row * height + 5), corner, red.tolist(), -1)
+    colour *= 0.75 + 0.5 * noise(generator, 32, 5)[..., None]
+    # Windows: one a repetition of 4 m.
+    cv2.rectangle(colour, (330, 300), (700, 720), (0.86, 0.85, 0.80), -1)
+    cv2.rectangle(colour, (355, 325), (505, 695), (0.22, 0.30, 0.38), -1)
+    cv2.rectangle(colour, (525, 325), (675, 695), (0.26, 0.35, 0.43), -1)
+    return _picture(colour)
+
+
+def _crate(generator: np.random.Generator) -> Picture:
+    stretched = cv2.resize(noise(generator, 32, 5), (PIXELS * 4, PIXELS))[:, :PIXELS]
+    colour = _blend((0.45, 0.30, 0.16), (0.78, 0.58, 0.34), stretched)
+    for row in range(0, PIXELS, 128):
+        colour[row : row + 128] *= generator.uniform(0.8, 1.15)
+        colour[row : row + 8] *= 0.35
+    frame = 90
+    edge = np.zeros((PIXELS, PIXELS), np.uint8)
+    cv2.rectangle(edge, (0, 0), (PIXELS - 1, PIXELS - 1), 1, frame * 2)
+    cv2.line(edge, (0, PIXELS), (PIXELS, 0), 1, frame)
+    colour[edge > 0] = colour[edge > 0] * 0.55 + np.asarray((0.38, 0.25, 0.12))
+    outline = cv2.morphologyEx(edge, cv2.MORPH_GRADIENT, np.ones((9, 9), np.uint8))
+    colour[outline > 0] *= 0.4
+    return _picture(colour)
+
+
+def _container(generator: np.random.Generator) -> Picture:
+    wave = 0.5 + 0.5 * np.sin(np.arange(PIXELS) * (2.0 * np.pi * 20 / PIXELS))
+    ribs = np.repeat((0.62 + 0.5 * wave)[None, :], PIXELS, axis=0).astype(np.float32)
+    colour = _blend((0.05, 0.22, 0.38), (0.13, 0.38, 0.58), noise(generator, 8, 7))
+    colour *= ribs[..., None]
+    rust = noise(generator, 8, 7) > 0.87
+    colour[rust] = colour[rust] * 0.4 + np.asarray((0.30, 0.14, 0.06))
+    cv2.rectangle(colour, (0, 0), (PIXELS - 1, PIXELS - 1), (0.05, 0.14, 0.22), 40)
+    letters = np.zeros((PIXELS, PIXELS), np.uint8)
+    for text, y, size in (("AUTOCOMPLETE", 430, 3.4), ("ARD 420 530 2", 640, 2.4)):
+        (wide, _), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_DUPLEX, size, 10)
+        cv2.putText(
+            letters, text, ((PIXELS - wide) // 2, y), cv2.FONT_HERSHEY_DUPLEX, size, 255, 10
+        )
+    colour[letters > 0] = (0.90, 0.92, 0.92)
+    return _picture(colour)
+
+
+def _foliage(generator: np.random.Generator) -> Picture:
+    colour = _blend((0.05, 0.14, 0.04), (0.20, 0.36, 0.11), noise(generator, 16, 6))
+    for _ in range(5000):
+        x, y = (int(each) for each in generator.integers(0, PIXELS, 2))
+        axes = (int(generator.integers(5, 14)), int(generator.integers(3, 7)))
+        green = generator.uniform(0.4, 1.7) * np.asarray((0.20, 0.37, 0.11))
+        cv2.ellipse(
+            colour, (x, y), axes, float(generator.uniform(0, 180)), 0, 360, green.tolist(), -1
+        )
+    return _picture(colour)
+
+
+def _post(generator: np.random.Generator) -> Picture:
+    colour = _blend((0.78, 0.78, 0.78), (0.92, 0.92, 0.92), noise(generator, 8, 5))
+    for begin in range(0, PIXELS, 256):
+        colour[begin : begin + 128] *= np.asarray((0.20, 0.21, 0.24), np.float32)
+    return _picture(colour)
+
+
+def _fence(generator: np.random.Generator) -> Picture:
+    """A panel 1.6 m high: a board of red and white fields below, a net above, a tape on top."""
+    colour = np.empty((PIXELS, PIXELS, 3), np.float32)
+    colour[:] = (0.16, 0.18, 0.20)
+    alpha = np.zeros((PIXELS, PIXELS), np.float32)
+    # Net: meshes of about 10 cm.
+    for at in range(0, PIXELS, 64):
+        alpha[at : at + 7, :] = 1.0
+    for at in range(0, PIXELS, 42):
+        alpha[:, at : at + 5] = 1.0
+    tape = slice(0, 44)
+    alpha[tape] = 1.0
+    colour[tape] = (0.96, 0.45, 0.05)
+    board = slice(724, PIXELS)
+    alpha[board] = 1.0
+    slope = np.arange(PIXELS)[None, :] + np.arange(PIXELS - 724)[:, None]
+    red = (slope // 128) % 2 == 0
+    colour[board] = np.where(red[..., None], (0.80, 0.08, 0.07), (0.93, 0.93, 0.91))
+    dirt = noise(generator, 16, 6)
+    colour[board] *= (0.72 + 0.4 * dirt[board])[..., None]
+    _spots(generator, colour[board], 120, (2, 6), (0.30, 0.27, 0.22))
+    colour[724:732] = 0.1
+    return _picture(colour, alpha)
+
+
+_PAINTERS: dict[
+    Texture, tuple[Callable[[np.random.Generator], Picture], float | None, float | None]
+] = {
+    "asphalt": (_asphalt, 4.0, 4.0),
+    "grass": (_grass, 4.0, 4.0),
+    "concrete": (_concrete, 2.0, 2.0),
+    "fence": (_fence, 2.5, None),
+    "post": (_post, 1.0, 0.8),
+    "crate": (_crate, None, None),
+    "brick": (_brick, 4.0, 4.0),
+    "container": (_container, None, None),
+    "foliage": (_foliage, 3.0, 3.0),
+}
+
+
+def sky(generator: np.random.Generator | None = None) -> Picture:
+    """The sky as a (256, 1024, 3) picture: all round across, zenith on top, below it the horizon.
+
+    A ridge of hills stands on the horizon, the same after a full turn.
+    """
+    generator = generator or np.random.default_rng(_SEED)
+    height, width = 256, 1024
+    up = np.linspace(1.0, 0.0, height, dtype=np.float32)[:, None, None]
+    zenith, horizon = np.asarray((0.22, 0.45, 0.78)), np.asarray((0.78, 0.87, 0.93))
+    colour = (horizon + (zenith - horizon) * up**0.55) * np.ones((1, width, 1))
+    # Clouds are drawn out along the horizon, as perspective has them.
+    clouds = cv2.resize(noise(generator, 8, 7)[:512], (width, height))
+    cover = np.clip((clouds - 0.55) * 3.2, 0.0, 1.0)[..., None] * np.clip(up * 6.0, 0.0, 1.0)
+    colour = colour * (1.0 - 0.85 * cover) + 0.85 * cover * np.asarray((1.0, 0.99, 0.97))
+    angle = np.linspace(0.0, 2.0 * np.pi, width, endpoint=False)
+    for base, tint in ((0.050, (0.55, 0.65, 0.72)), (0.030, (0.36, 0.48, 0.42))):
+        ridge = np.full(width, base)
+        for wave in range(3, 40):
+            ridge += base / wave**0.9 * 0.5 * np.sin(wave * angle + generator.uniform(0, 6.28))
+        below = up[:, :, 0] < np.maximum(ridge, 0.008)[None, :]
+        colour[below] = tint
+    return np.asarray(np.clip(colour * 255.0, 0.0, 255.0), np.uint8)

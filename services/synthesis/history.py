@@ -1,0 +1,109 @@
+"""What the vehicle did lately, as far as poses tell: points equally spaced along the way flown."""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from common.clock import nanoseconds, seconds
+from common.frames import Array, yaw_of
+from common.messages import Pose
+
+SPAN_S = 10.0
+"""Longer than any window of the classifier: 200 sticks last 4 s."""
+CELL_M = 0.05
+"""Poses within this length of the way become one point, so that slow parts do not weigh more."""
+SMOOTH_S = 0.1
+"""Length of the way is measured over means of this time; noise of single poses would add to it."""
+SPEED_S = 1.0
+"""The vehicle's present speed is its mean over this time; the velocity loop needs 0.4 s."""
+GAP_S = 0.5
+JUMP_M = 1.0
+JUMP_MPS = 10.0
+"""Poses further apart than `JUMP_M`, at more than this speed, are a reset, not a flight."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """The way flown in a window.
+
+    Attributes:
+        points_m: (N, 3), about `CELL_M` apart, oldest first.
+        here_m: the newest position (3,).
+        yaw_rad: the newest yaw.
+        speed_mps: the recent mean speed.
+    """
+
+    points_m: Array
+    here_m: Array
+    yaw_rad: float
+    speed_mps: float
+
+
+class History:
+    """A ring of poses by the time of their arrival; it starts anew where they stop making sense."""
+
+    def __init__(self) -> None:
+        self._poses: deque[tuple[int, Pose]] = deque()
+
+    def add(self, pose: Pose, arrival_ns: int) -> None:
+        """Take in a pose; a lost one, a gap or a jump forgets what was before."""
+        if self._poses:
+            previous_ns, previous = self._poses[-1]
+            elapsed_s = seconds(arrival_ns - previous_ns)
+            jump_m = math.dist(pose.position, previous.position)
+            lost = previous.status == "lost" or pose.status == "lost"
+            if lost or elapsed_s > GAP_S or jump_m > max(JUMP_M, JUMP_MPS * elapsed_s):
+                self._poses.clear()
+        self._poses.append((arrival_ns, pose))
+        while arrival_ns - self._poses[0][0] > nanoseconds(SPAN_S):
+            self._poses.popleft()
+
+    @property
+    def newest(self) -> tuple[int, Pose] | None:
+        """The newest pose and when it arrived."""
+        return self._poses[-1] if self._poses else None
+
+    def track(self, begin_ns: int, end_ns: int) -> Track | None:
+        """The way flown by the poses that arrived within a window; None if there are under two."""
+        chosen = [(ns, pose) for ns, pose in self._poses if begin_ns <= ns <= end_ns]
+        if len(chosen) < 2:
+            return None
+        time_s = np.array([seconds(ns - chosen[-1][0]) for ns, _ in chosen])
+        position_m = np.array([pose.position for _, pose in chosen])
+        way_m, speed_mps = _way(time_s, position_m)
+        return Track(
+            _means(position_m, np.floor(way_m / CELL_M)),
+            position_m[-1],
+            yaw_of(chosen[-1][1].orientation),
+            speed_mps,
+        )
+
+
+def _means(values: Array, labels: Array) -> Array:
+    """Means (M, K) of the rows (N, K) that share a label; labels do not fall."""
+    starts = np.flatnonzero(np.diff(labels, prepend=-1.0))
+    counts = np.diff(starts, append=len(labels))
+    return np.asarray(np.add.reduceat(values, starts, axis=0) / counts[:, None])
+
+
+def _way(time_s: Array, position_m: Array) -> tuple[Array, float]:
+    """Length (N,) of the way flown up to each position, and the recent mean speed."""
+    labels = np.floor((time_s - time_s[0]) / SMOOTH_S)
+    smooth = _means(np.column_stack([time_s, position_m]), labels)
+    if len(smooth) < 2:
+        return np.zeros(len(time_s)), 0.0
+    steps = np.linalg.norm(np.diff(smooth[:, 1:], axis=0), axis=1)
+    way = np.concatenate([[0.0], np.cumsum(steps)])
+    recent = smooth[:, 0] >= smooth[-1, 0] - SPEED_S
+    first = int(np.argmax(recent))
+    first = min(first, len(smooth) - 2)
+    elapsed = float(smooth[-1, 0] - smooth[first, 0])
+    speed = float(way[-1] - way[first]) / elapsed if elapsed > 0.0 else 0.0
+    # Beyond the outer means the speed is that of the nearest step.
+    before = (time_s - smooth[0, 0]) * steps[0] / (smooth[1, 0] - smooth[0, 0])
+    after = (time_s - smooth[-1, 0]) * steps[-1] / (smooth[-1, 0] - smooth[-2, 0])
+    inside = np.interp(time_s, smooth[:, 0], way)
+    total = inside + np.minimum(before, 0.0) + np.maximum(after, 0.0)
+    return np.maximum.accumulate(total - total[0]), speed

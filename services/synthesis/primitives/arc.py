@@ -1,0 +1,223 @@
+"""A level circle, flown on and on.
+
+Taubin's algebraic fit starts Levenberg-Marquardt on the geometric distance (thesis 3.2.2). The
+thesis' algorithm 1 makes half a circle of its 64 points and takes counter-clockwise for negative;
+here 64 points are half a turn, a lap is 2 pi, and angles grow counter-clockwise (erratum 2).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from common.frames import Array
+from services.synthesis.config import Config
+from services.synthesis.primitives.shape import (
+    STEP_M,
+    Quality,
+    Shape,
+    UnfitError,
+    levenberg_marquardt,
+)
+
+POINTS_PER_HALF_TURN = 64
+RMS_SHARE = 0.15
+"""Of the radius: noise of 5 % in each coordinate is 9 %."""
+MIN_SAGITTA_SHARE = 1.5
+"""Of the residual. 30 degrees at 5 % noise have 0.7 and no method finds their radius; 60 have 2.7
+(references.md, 8)."""
+MIN_SWEEP_RAD = math.radians(20.0)
+"""Less says too little about the centre."""
+LINE_SWEEP_RAD = math.radians(10.0)
+"""Less than this is a line that was not flown quite straight."""
+_STRAIGHT_SWEEP_RAD = math.radians(5.0)
+"""Below this the centre is so far away that only Taubin's curvature is of use."""
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A circle fitted in a plane, and what the points did around it.
+
+    Attributes:
+        centre_m: (2,).
+        radius_m: its radius.
+        radius_std_m: standard error of the radius, if the points' errors are independent.
+        angles_rad: unwrapped angles (N,) of the points about the centre.
+        off_m: signed distances (N,) of the points from the circle, + outside.
+    """
+
+    centre_m: Array
+    radius_m: float
+    radius_std_m: float
+    angles_rad: Array
+    off_m: Array
+
+    @property
+    def sense(self) -> float:
+        """+1 counter-clockwise, -1 clockwise."""
+        return 1.0 if self.angles_rad[-1] >= self.angles_rad[0] else -1.0
+
+    @property
+    def swept_rad(self) -> float:
+        """Angle between the first and the last point, without sign."""
+        return abs(float(self.angles_rad[-1] - self.angles_rad[0]))
+
+    def angle_of(self, point_m: Array) -> float:
+        """The angle of a point (2,), in the turn of the newest point."""
+        offset = point_m - self.centre_m
+        newest = float(self.angles_rad[-1])
+        angle = math.atan2(offset[1], offset[0])
+        return newest + math.remainder(angle - newest, 2.0 * math.pi)
+
+    def quality(self, rms_m: float) -> Quality:
+        """Its quality, with the signed curvature in 1/m as the estimate."""
+        return Quality(
+            rms_m=rms_m,
+            extent_m=self.swept_rad * self.radius_m,
+            count=len(self.off_m),
+            estimate=self.sense / self.radius_m,
+            estimate_std=self.radius_std_m / self.radius_m**2,
+            doubt=self.radius_std_m / self.radius_m,
+        )
+
+    def check(self, config: Config) -> None:
+        """Raise UnfitError where it is too wide, too tight, or cannot be told from a line."""
+        rms_m = math.sqrt(float(np.mean(self.off_m**2)))
+        half_rad = min(self.swept_rad / 2.0, math.pi)
+        sagitta_m = self.radius_m * (1.0 - math.cos(half_rad))
+        if self.swept_rad < MIN_SWEEP_RAD:
+            raise UnfitError(
+                f"only {math.degrees(self.swept_rad):.0f} degrees of it were flown",
+                "line" if self.swept_rad < LINE_SWEEP_RAD else None,
+            )
+        if sagitta_m < MIN_SAGITTA_SHARE * rms_m:
+            raise UnfitError("it cannot be told from a line within the noise", "line")
+        if self.radius_m > config.max_radius_m:
+            raise UnfitError(
+                f"its radius of {self.radius_m:.1f} m is above {config.max_radius_m} m"
+            )
+        if self.radius_m < config.min_radius_m:
+            raise UnfitError(
+                f"its radius of {self.radius_m:.2f} m is below {config.min_radius_m} m"
+            )
+
+
+def taubin(points_m: Array) -> tuple[Array, float]:
+    """The centre (2,) and radius of Taubin's circle through points (N, 2).
+
+    G. Taubin, IEEE PAMI 13(11), 1991, by the singular values of the centred points.
+
+    Raises:
+        UnfitError: if the points lie on a line.
+    """
+    mean = points_m.mean(axis=0)
+    centred = points_m - mean
+    squares = np.sum(centred**2, axis=1)
+    power = float(squares.mean())
+    if power <= 1e-18:
+        raise UnfitError("all points are the same")
+    scale = 2.0 * math.sqrt(power)
+    _, _, axes = np.linalg.svd(
+        np.column_stack([(squares - power) / scale, centred]), full_matrices=False
+    )
+    quadratic = axes[2, 0] / scale
+    if abs(quadratic) * math.sqrt(power) < 1e-9:
+        raise UnfitError("the points lie on a line", "line")
+    slopes = axes[2, 1:]
+    radius = math.sqrt(float(slopes @ slopes) + 4.0 * quadratic**2 * power) / abs(quadratic) / 2.0
+    return mean - slopes / (2.0 * quadratic), radius
+
+
+def fit_circle(points_m: Array) -> Circle:
+    """The circle of least squared distance from points (N, 2), oldest first.
+
+    Raises:
+        UnfitError: if the points lie on a line.
+    """
+    x, y = points_m.T
+
+    def residuals(circle: Array) -> Array:
+        return np.asarray(np.hypot(x - circle[0], y - circle[1]) - circle[2])
+
+    def jacobian(circle: Array) -> Array:
+        dx, dy = circle[0] - x, circle[1] - y
+        distance = np.maximum(np.hypot(dx, dy), 1e-9)
+        return np.stack([dx / distance, dy / distance, np.full_like(x, -1.0)])
+
+    centre, radius = taubin(points_m)
+    chord_m = float(np.ptp(points_m, axis=0).max())
+    if chord_m / radius < _STRAIGHT_SWEEP_RAD:
+        off = residuals(np.array([*centre, radius]))
+        sigma = math.sqrt(float(off @ off) / max(len(x) - 3, 1))
+        # The error of a parabola's curvature: sigma sqrt(720 / N) / length^2.
+        radius_std = sigma * math.sqrt(720.0 / len(x)) / chord_m**2 * radius**2
+    else:
+        circle, covariance, _ = levenberg_marquardt(
+            residuals, jacobian, np.array([*centre, radius])
+        )
+        centre, radius = circle[:2], abs(float(circle[2]))
+        off = residuals(np.array([*centre, radius]))
+        radius_std = math.sqrt(max(float(covariance[2, 2]), 0.0))
+    angles = np.unwrap(np.arctan2(y - centre[1], x - centre[0]))
+    return Circle(centre, radius, radius_std, angles, off)
+
+
+def angles_ahead(start_rad: float, sense: float, radius_m: float, half_turns: int) -> Array:
+    """Angles from a start on: 64 steps a half turn, more where that leaves steps over `STEP_M`."""
+    steps = half_turns * max(POINTS_PER_HALF_TURN, math.ceil(math.pi * radius_m / STEP_M))
+    return np.asarray(start_rad + sense * np.linspace(0.0, half_turns * math.pi, steps + 1))
+
+
+@dataclass(frozen=True)
+class Arc(Shape):
+    """A level circle; the `estimate` is its signed curvature in 1/m, + counter-clockwise."""
+
+    name: ClassVar[str] = "arc"
+    closed: ClassVar[bool] = True
+    min_points: ClassVar[int] = 5
+
+    circle: Circle
+    height_m: float
+    start_rad: float
+
+    @classmethod
+    def fit(cls, points_m: Array, start_m: Array) -> Self:
+        """A circle in the horizontal plane of the points' mean height."""
+        circle = fit_circle(points_m[:, :2])
+        heights = points_m[:, 2]
+        rms = math.sqrt(float(np.mean(circle.off_m**2) + np.var(heights)))
+        return cls(
+            circle.quality(rms),
+            circle,
+            float(heights.mean()),
+            circle.angle_of(start_m[:2]),
+        )
+
+    @property
+    def params(self) -> dict[str, float]:
+        """Centre, height, radius, and the sweep of the way ahead: one lap, signed."""
+        return {
+            "cx": float(self.circle.centre_m[0]),
+            "cy": float(self.circle.centre_m[1]),
+            "z": self.height_m,
+            "radius": self.circle.radius_m,
+            "sweep": self.circle.sense * 2.0 * math.pi,
+        }
+
+    @property
+    def rms_limit_m(self) -> float:
+        """A share of the radius."""
+        return RMS_SHARE * self.circle.radius_m
+
+    def check(self, config: Config) -> None:
+        """Refuse what cannot be told from a line."""
+        self.circle.check(config)
+
+    def ahead(self) -> Array:
+        """One lap, whose last point is its first."""
+        circle = self.circle
+        angles = angles_ahead(self.start_rad, circle.sense, circle.radius_m, half_turns=2)
+        xy = circle.centre_m + circle.radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
+        xy[-1] = xy[0]
+        return np.column_stack([xy, np.full(len(xy), self.height_m)])

@@ -1,0 +1,274 @@
+"""A level wave about a straight axis.
+
+The principal axis turns the points, a least-squares periodogram (the FFT's sum for unequal steps,
+offset and trend fitted with it) starts Levenberg-Marquardt, and the wave is turned back (thesis
+3.2.4). The axis itself is a parameter of the second step: over part of a wave the principal axis is
+not the wave's.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from common.frames import Array
+from services.synthesis.config import Config
+from services.synthesis.primitives.shape import (
+    STEP_M,
+    Quality,
+    Shape,
+    UnfitError,
+    levenberg_marquardt,
+)
+
+WAVES_AHEAD = 3
+RMS_SHARE = 0.3
+"""Of the amplitude: noise of 10 % in each coordinate is 14 % across the wave."""
+MIN_AMPLITUDE_M = 0.05
+MIN_WAVES = 0.5
+"""Less has no bend to either side; the thesis' data has one inflection at least (4.1)."""
+_MAX_WAVES = 6.0
+_START_WAVES = np.geomspace(0.4, _MAX_WAVES, 20)
+_START_POINTS = 45
+_START_TURNS_RAD = ((0.0,), (math.radians(-30.0), math.radians(30.0)), (math.radians(90.0),))
+"""Axes to start from, against the principal one, until the residual is mere noise."""
+_GOOD_START = 1.6
+
+
+@dataclass(frozen=True)
+class Sine(Shape):
+    """A wave `amplitude sin(2 pi s / wavelength + phase)` to the left of its axis.
+
+    `s` is the way along the axis from the anchor, which lies beside the vehicle. The `estimate` is
+    the wavelength in m.
+    """
+
+    name: ClassVar[str] = "sine"
+    min_points: ClassVar[int] = 8
+    steady: ClassVar[bool] = False
+
+    anchor_m: Array
+    heading_rad: float
+    amplitude_m: float
+    wavelength_m: float
+    phase_rad: float
+    waves: float
+
+    @classmethod
+    def fit(cls, points_m: Array, start_m: Array) -> Self:
+        """A wave in the horizontal plane of the points' mean height."""
+        xy = points_m[:, :2]
+        mean = xy.mean(axis=0)
+        wave, covariance = _fit_wave(xy - mean)
+        axis_rad, offset, sine, cosine, number = (float(v) for v in wave)
+        along, across = _turned(xy - mean, axis_rad)
+        slope = number * (sine * np.cos(number * along) - cosine * np.sin(number * along))
+        off = across - _wave(along, offset, sine, cosine, number)
+        off = off / np.hypot(1.0, slope)
+        heights = points_m[:, 2]
+        rms = math.sqrt(float(np.mean(off**2) + np.var(heights)))
+
+        amplitude = math.hypot(sine, cosine)
+        phase = math.atan2(cosine, sine)
+        order = np.arange(len(along)) - (len(along) - 1) / 2.0
+        if along @ order < 0.0:
+            # Looking the other way both coordinates change sign: -A sin(-k s + p) = A sin(k s - p).
+            axis_rad += math.pi
+            offset, phase, along = -offset, -phase, -along
+        start_along = float(_turned(start_m[None, :2] - mean, axis_rad)[0][0])
+        heading = math.remainder(axis_rad, 2.0 * math.pi)
+        cos, sin = math.cos(heading), math.sin(heading)
+        amplitude_var = (
+            sine**2 * covariance[2, 2]
+            + cosine**2 * covariance[3, 3]
+            + 2.0 * sine * cosine * covariance[2, 3]
+        ) / max(amplitude**2, 1e-12)
+        wavelength = 2.0 * math.pi / number
+        wavelength_doubt = math.sqrt(max(float(covariance[4, 4]), 0.0)) / number
+        extent = float(np.ptp(along))
+        return cls(
+            quality=Quality(
+                rms_m=rms,
+                extent_m=extent,
+                count=len(along),
+                estimate=wavelength,
+                estimate_std=wavelength_doubt * wavelength,
+                doubt=max(
+                    wavelength_doubt, math.sqrt(max(amplitude_var, 0.0)) / max(amplitude, 1e-9)
+                ),
+            ),
+            anchor_m=np.array(
+                [
+                    mean[0] + cos * start_along - sin * offset,
+                    mean[1] + sin * start_along + cos * offset,
+                    float(heights.mean()),
+                ]
+            ),
+            heading_rad=heading,
+            amplitude_m=amplitude,
+            wavelength_m=wavelength,
+            phase_rad=math.remainder(phase + number * start_along, 2.0 * math.pi),
+            waves=extent / wavelength,
+        )
+
+    @property
+    def params(self) -> dict[str, float]:
+        """The axis beside the vehicle, and the wave from there on."""
+        x, y, z = (float(v) for v in self.anchor_m)
+        return {
+            "x": x,
+            "y": y,
+            "z": z,
+            "heading": self.heading_rad,
+            "amplitude": self.amplitude_m,
+            "wavelength": self.wavelength_m,
+            "phase": self.phase_rad,
+        }
+
+    @property
+    def rms_limit_m(self) -> float:
+        """A share of the amplitude."""
+        return RMS_SHARE * self.amplitude_m
+
+    def check(self, config: Config) -> None:
+        """Refuse what cannot be told from a line, and less than half a wave."""
+        if self.amplitude_m < MIN_AMPLITUDE_M:
+            raise UnfitError(f"its amplitude is only {self.amplitude_m:.2f} m", "line")
+        if self.waves < MIN_WAVES:
+            raise UnfitError(f"only {self.waves:.2f} waves of it were flown")
+
+    def ahead(self) -> Array:
+        """The next three waves."""
+        dense = np.linspace(0.0, WAVES_AHEAD * self.wavelength_m, 128 * WAVES_AHEAD + 1)
+        across = self._across(dense)
+        length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(dense), np.diff(across)))])
+        steps = max(round(float(length[-1]) / STEP_M), 32 * WAVES_AHEAD)
+        along = np.interp(np.linspace(0.0, length[-1], steps + 1), length, dense)
+        across = self._across(along)
+        cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        x, y, z = self.anchor_m
+        return np.column_stack(
+            [
+                x + cos * along - sin * across,
+                y + sin * along + cos * across,
+                np.full_like(along, z),
+            ]
+        )
+
+    def _across(self, along: Array) -> Array:
+        number = 2.0 * math.pi / self.wavelength_m
+        return np.asarray(self.amplitude_m * np.sin(number * along + self.phase_rad))
+
+
+def _turned(xy: Array, axis_rad: float) -> tuple[Array, Array]:
+    """Points (N, 2) along and to the left of an axis."""
+    cos, sin = math.cos(axis_rad), math.sin(axis_rad)
+    return cos * xy[:, 0] + sin * xy[:, 1], cos * xy[:, 1] - sin * xy[:, 0]
+
+
+def _wave(along: Array, offset: float, sine: float, cosine: float, number: float) -> Array:
+    return np.asarray(offset + sine * np.sin(number * along) + cosine * np.cos(number * along))
+
+
+def _first_guesses(xy: Array, axis_rad: float) -> list[tuple[float, Array]]:
+    """Waves to start from, with their mean squares, for one guess of the axis.
+
+    For each wave number the best offset, trend, sine and cosine are linear; the trend turns the
+    axis.
+    """
+    along, across = _turned(xy, axis_rad)
+    extent = float(np.ptp(along))
+    numbers = 2.0 * math.pi * _START_WAVES / extent
+    phases = np.outer(numbers, along)
+    basis = np.empty((len(numbers), 4, len(along)))
+    basis[:, 0] = 1.0
+    basis[:, 1] = along / extent
+    np.sin(phases, out=basis[:, 2])
+    np.cos(phases, out=basis[:, 3])
+    normal = basis @ basis.transpose(0, 2, 1)
+    normal += 1e-6 * len(along) * np.eye(4)
+    weights = np.linalg.solve(normal, (basis @ across)[..., None])
+    off = across - (weights.transpose(0, 2, 1) @ basis)[:, 0]
+    misfit = np.mean(off**2, axis=1)
+    padded = np.concatenate([[np.inf], misfit, [np.inf]])
+    guesses = []
+    for index in np.flatnonzero((misfit <= padded[:-2]) & (misfit <= padded[2:])):
+        offset, trend, sine, cosine = (float(v) for v in weights[index, :, 0])
+        turn = math.atan(trend / extent)
+        wave = np.array([axis_rad + turn, offset, sine, cosine, float(numbers[index])])
+        guesses.append((float(misfit[index]), wave))
+    return guesses
+
+
+def _noise(xy: Array) -> float:
+    """Standard deviation of the points' own noise: what neighbours do not share, in m."""
+    third = np.diff(xy, n=3, axis=0)
+    return math.sqrt(float(np.mean(third**2)) / 20.0) if len(third) else 0.0
+
+
+def _fit_wave(xy: Array) -> tuple[Array, Array]:
+    """Axis (rad), offset, sine and cosine amplitudes, wave number of centred points (N, 2).
+
+    Returns:
+        these five, and their covariance if the points' errors are independent.
+
+    Raises:
+        UnfitError: if no wave is determined.
+    """
+    _, singular, axes = np.linalg.svd(xy, full_matrices=False)
+    if singular[0] <= 1e-9:
+        raise UnfitError("all points are the same")
+    principal = math.atan2(axes[0, 1], axes[0, 0])
+    thin = xy[:: max(1, len(xy) // _START_POINTS)]
+    noise_m = _noise(xy)
+    x, y = xy.T
+    weight = np.ones(len(x))
+
+    def terms(wave: Array) -> tuple[Array, Array, Array, Array, Array]:
+        cos, sin = math.cos(wave[0]), math.sin(wave[0])
+        along, across = cos * x + sin * y, cos * y - sin * x
+        s, c = np.sin(wave[4] * along), np.cos(wave[4] * along)
+        return along, across, s, c, wave[2] * c - wave[3] * s
+
+    def residuals(wave: Array) -> Array:
+        _, across, s, c, _ = terms(wave)
+        return np.asarray((across - wave[1] - wave[2] * s - wave[3] * c) * weight)
+
+    def jacobian(wave: Array) -> Array:
+        along, across, s, c, tilt = terms(wave)
+        return np.stack(
+            [
+                (-along - wave[4] * tilt * across) * weight,
+                -weight,
+                -s * weight,
+                -c * weight,
+                -along * tilt * weight,
+            ]
+        )
+
+    def slopes(wave: Array) -> Array:
+        return np.asarray(np.hypot(1.0, wave[4] * terms(wave)[4]))
+
+    best: tuple[float, Array] | None = None
+    for turns in _START_TURNS_RAD:
+        guesses = [guess for turn in turns for guess in _first_guesses(thin, principal + turn)]
+        guesses.sort(key=lambda guess: guess[0])
+        for _, guess in guesses[:2]:
+            try:
+                wave, _, _ = levenberg_marquardt(residuals, jacobian, guess)
+            except UnfitError:
+                continue
+            off_m = math.sqrt(float(np.mean((residuals(wave) / slopes(wave)) ** 2)))
+            if wave[4] > 0.0 and (best is None or off_m < best[0]):
+                best = off_m, wave
+            if off_m < _GOOD_START * noise_m:
+                break
+        if best is not None and best[0] < _GOOD_START * noise_m:
+            break
+    if best is None:
+        raise UnfitError("the points do not determine a wave")
+    # Errors lie in both directions: a steep part weighs less, by the distance to its tangent.
+    weight = 1.0 / slopes(best[1])
+    wave, covariance, _ = levenberg_marquardt(residuals, jacobian, best[1])
+    return wave, covariance

@@ -1,0 +1,38 @@
+"""Wiring of synthesis: poses and intents in, suggestions out, `synthesis/fit` answered."""
+
+from common import messages as m
+from common.node import Node, RefusedError
+from services.synthesis.config import Config
+from services.synthesis.core import RefusalError, Synthesizer
+
+POSE_DEPTH = 256
+"""Poses are a history here, not a newest value: few may be lost while a fit runs."""
+
+
+def wire(node: Node, config: Config) -> None:
+    """Connect the core to its topics."""
+    synthesizer = Synthesizer(config)
+    node.publishes("suggestion")
+
+    def on_intent(intent: m.Intent, arrival_ns: int) -> None:
+        suggestion = synthesizer.on_intent(intent, arrival_ns)
+        if suggestion is not None:
+            node.publish("suggestion", suggestion)
+
+    def fit(request: m.FitRequest, now_ns: int) -> m.Suggestion:
+        try:
+            return synthesizer.fit(request, node.clock.utc_ns(), now_ns)
+        except RefusalError as refusal:
+            raise RefusedError(str(refusal), refusal.field) from None
+
+    def health() -> tuple[m.HealthState, str]:
+        refusal = synthesizer.last_refusal
+        detail = f"no suggestion: {refusal}" if refusal else ""
+        trouble = synthesizer.pose_trouble(node.clock.monotonic_ns())
+        return ("ok", detail) if trouble is None else ("degraded", detail or trouble)
+
+    # Poses before intents: those that wait together belong to the intent's window.
+    node.on("pose", synthesizer.on_pose, depth=POSE_DEPTH)
+    node.on("intent", on_intent, timed=True)
+    node.answer("synthesis/fit", fit)
+    node.reports(health)

@@ -1,0 +1,201 @@
+"""Paths are flown to centimetres, by a vehicle that lags, in noise and in wind."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from autopilot_worlds import PERIOD_S, LaggingVehicle, Rig, circle, line, sine, suggestion
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from services.autopilot.config import Config
+from services.autopilot.follower import Follower
+from services.autopilot.path import BadPathError, Path
+from services.autopilot.pid import Gains, Pid
+
+
+def flown(rig: Rig, duration_s: float, skip_s: float = 0.0) -> np.ndarray:
+    """Places x, y, z, yaw while engaged."""
+    places = []
+    for tick in range(round(duration_s / PERIOD_S)):
+        rig.tick()
+        if rig.autopilot.mode != "engaged":
+            break
+        if tick * PERIOD_S >= skip_s:
+            places.append((rig.body.x, rig.body.y, rig.body.z, rig.body.yaw))
+    return np.array(places)
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_line_is_flown_to_5_cm(seed):
+    rig = Rig(LaggingVehicle(noise=1.0, seed=seed))
+    rig.engage(line(20.0))
+    places = flown(rig, 20.0)
+    assert rms(places[:, 1]) < 0.05
+    assert rms(places[:, 2] - 1.0) < 0.03
+    assert rms(places[:, 3]) < math.radians(3)
+
+
+@pytest.mark.parametrize("radius_m", [2.0, 3.0, 4.0])
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_circle_is_flown_to_10_cm_with_the_nose_along_it(radius_m, turn):
+    rig = Rig(LaggingVehicle(noise=1.0))
+    rig.engage(circle(radius_m, turn), closed=True)
+    places = flown(rig, 30.0)
+    x, y = places[:, 0], places[:, 1] - turn * radius_m
+    assert rms(np.hypot(x, y) - radius_m) < 0.05
+    tangent = np.arctan2(y, x) + turn * math.pi / 2
+    off = (places[:, 3] - tangent + math.pi) % (2 * math.pi) - math.pi
+    assert rms(off) < math.radians(4)
+    assert rig.status.progress == pytest.approx(30.0 * 0.9, rel=0.05)
+
+
+def test_a_helix_and_a_sine_are_flown_to_10_cm():
+    for path in (circle(2.0, pitch_m=0.6, turns=2), sine()):
+        rig = Rig(LaggingVehicle(noise=1.0))
+        rig.engage(path)
+        places = flown(rig, 40.0)
+        assert rig.status.reason == "finished"
+        gaps = [np.linalg.norm(np.array(path)[:, :3] - place[:3], axis=1).min() for place in places]
+        assert rms(np.array(gaps)) < 0.10
+
+
+def test_steady_wind_is_held_against():
+    rig = Rig(LaggingVehicle(wind_mps=(0.0, 0.25)))
+    rig.engage(line(40.0), speed=0.5)
+    places = flown(rig, 60.0, skip_s=15.0)
+    assert rms(places[:, 1]) < 0.05
+
+
+def test_a_start_beside_the_path_comes_back_without_swinging():
+    rig = Rig(LaggingVehicle(y=0.8, yaw=0.5))
+    rig.engage(line(20.0))
+    places = flown(rig, 20.0)
+    assert places[:, 1].min() > -0.15
+    assert rms(places[250:, 1]) < 0.05
+
+
+def test_the_nose_may_point_backward_at_the_start():
+    rig = Rig(LaggingVehicle(yaw=math.pi))
+    rig.engage(line(20.0))
+    places = flown(rig, 25.0)
+    assert places[-1, 0] > 19.5
+    assert np.abs(places[:, 1]).max() < 0.4
+
+
+def test_progress_never_goes_back_and_cannot_jump_to_another_branch():
+    points = circle(1.5) + [(x, y, z, yaw) for x, y, z, yaw in circle(1.5, turn=-1)][1:]
+    rig = Rig(LaggingVehicle(noise=1.0))
+    rig.engage(points, closed=True)
+    progress = []
+    for _ in range(1200):
+        rig.tick()
+        progress.append(rig.autopilot._follower.progress_m)
+    steps = [b - a for a, b in pairwise(progress)]
+    assert min(steps) >= 0.0
+    assert max(steps) < 0.1
+    assert progress[-1] > 15.0
+
+
+def test_the_speed_stays_within_what_the_vehicle_can_do():
+    rig = Rig()
+    for path, limit in (
+        (line(), 0.9),
+        (circle(0.5), math.sqrt(0.5) + 0.01),
+        ([(0.0, 0.0, 1.0 + 0.1 * i, 0.0) for i in range(50)], 0.451),
+    ):
+        follower = Follower(suggestion(path, speed=5.0), rig.body.pose(0), "tum", Config())
+        assert follower._profile.max() <= limit
+        assert follower._profile[-1] <= 0.15 + 1e-9
+
+
+def test_the_ardrone_plant_is_led_by_its_own_lag():
+    body = Rig().body
+    for plant in ("tum", "ardrone"):
+        follower = Follower(suggestion(line()), body.pose(0), plant, Config())
+        sticks = [follower.sticks(body.pose(0), 0.0, 0.02) for _ in range(50)][-1]
+        assert 0.0 < sticks.vx <= 1.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(*[st.floats(-1e3, 1e3)] * 3, st.floats(-10.0, 10.0)), min_size=2, max_size=30
+    ),
+    st.booleans(),
+    st.floats(0.0, 100.0),
+    st.floats(0.0, 0.3),
+)
+def test_whatever_path_comes_the_sticks_stay_within_full_stick(points, closed, speed, dt_s):
+    body = LaggingVehicle(*points[0][:3], yaw=1.0)
+    config = Config(min_height_m=0.0, max_height_m=1e6)
+    points = [(x, y, abs(z), yaw) for x, y, z, yaw in points]
+    body.z = points[0][2]
+    try:
+        follower = Follower(suggestion(points, closed, speed), body.pose(0), "tum", config)
+    except BadPathError:
+        return
+    for _ in range(5):
+        sticks = follower.sticks(body.pose(0), 0.05, dt_s)
+        for axis in (sticks.vx, sticks.vy, sticks.vz, sticks.wz):
+            assert abs(axis) <= 1.0 + 1e-9
+
+
+class TestPath:
+    def test_positions_tangents_yaw_and_curvature_are_those_of_the_circle(self):
+        path = Path(circle(2.0), closed=True)
+        assert path.length_m == pytest.approx(4 * math.pi, rel=1e-3)
+        assert path.curvature_1pm == pytest.approx(0.5, rel=0.05)
+        for distance_m in np.linspace(0.0, 30.0, 200):
+            here, angle = path.at(distance_m), distance_m / 2.0
+            assert here.position_m[:2] == pytest.approx(
+                (2 * math.sin(angle), 2 - 2 * math.cos(angle)), abs=0.02
+            )
+            assert here.tangent[:2] == pytest.approx((math.cos(angle), math.sin(angle)), abs=0.03)
+            assert here.yaw_rad == pytest.approx(angle, abs=0.02)
+            assert here.yaw_rate_radpm == pytest.approx(0.5, abs=0.02)
+
+    def test_an_open_path_stays_at_its_ends(self):
+        path = Path(line(2.0), closed=False)
+        assert path.at(-1.0).position_m == (0.0, 0.0, 1.0)
+        assert path.at(9.0).position_m == pytest.approx((2.0, 0.0, 1.0))
+        assert path.advanced_m(2.0, (5.0, 0.0, 1.0)) == pytest.approx(2.0)
+
+    def test_repeated_points_and_two_points_are_paths_too(self):
+        twice = [point for point in line(1.0) for _ in range(2)]
+        assert Path(twice, closed=False).length_m == pytest.approx(1.0)
+        far = Path([(0.0, 0.0, 1.0, 0.0), (10.0, 0.0, 1.0, 0.0)], closed=False)
+        assert far.at(5.0).position_m == pytest.approx((5.0, 0.0, 1.0))
+
+    def test_a_path_starts_on_the_first_of_two_crossing_branches(self):
+        eight = circle(2.0) + circle(2.0, turn=-1)[1:]
+        path = Path(eight, closed=True)
+        assert path.nearest_start_m((0.02, 0.0, 1.0), 1.0) == pytest.approx(0.02, abs=0.01)
+
+
+class TestPid:
+    def test_each_term_does_its_part(self):
+        pid = Pid(Gains(2.0, 1.0, 0.5, 10.0), 2)
+        assert pid.correction([1.0, 0.0], [0.0, 2.0], 0.1, False) == [2.0, 1.0]
+        assert pid.correction([0.0, 0.0], [0.0, 0.0], 0.1, False) == pytest.approx([0.1, 0.0])
+
+    def test_the_integral_does_not_wind_up(self):
+        pid = Pid(Gains(1.0, 1.0, 0.0, 1.0), 1)
+        for _ in range(1000):
+            assert abs(pid.correction([5.0], [0.0], 0.1, False)[0]) <= 1.0
+        assert pid.correction([0.0], [0.0], 0.1, False) == [0.0]
+        for _ in range(1000):
+            pid.correction([0.5], [0.0], 0.1, True)
+        assert pid.correction([0.0], [0.0], 0.1, False) == [0.0]
+        for _ in range(1000):
+            pid.correction([0.4], [0.0], 0.1, False)
+        assert pid.correction([0.0], [0.0], 0.1, False) == [pytest.approx(0.5)]
+
+    def test_the_limit_keeps_the_direction(self):
+        out = Pid(Gains(1.0, 0.0, 0.0, 1.0), 2).correction([3.0, 4.0], [0.0, 0.0], 0.1, False)
+        assert out == pytest.approx([0.6, 0.8])

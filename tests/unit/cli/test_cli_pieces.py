@@ -1,0 +1,158 @@
+"""The parts of the command line that need no network."""
+
+import argparse
+from pathlib import Path
+
+import pytest
+
+from cli import doctor, options
+from cli.contract import page
+from cli.echo import summary
+from cli.main import main
+from cli.meter import WINDOW_S, Meter
+from cli.run import _service_in
+from common import messages as m
+from common.topics import QUERIES, TOPICS
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_the_page_of_the_contract_is_what_the_code_says() -> None:
+    assert (ROOT / "docs/contract.md").read_text() == page(), "run 'make docs'"
+
+
+def test_the_page_names_every_topic_query_and_field() -> None:
+    text = page()
+    for topic in TOPICS.values():
+        if topic.message is not m.Health:
+            assert f"| `{topic.name}` | {topic.message.__name__} | {topic.publisher} |" in text
+        for field in topic.message.__struct_fields__:
+            assert f"`{field}`" in text
+    for query in QUERIES.values():
+        assert f"| `{query.name}` |" in text
+        for payload in (query.request, query.reply):
+            assert f"### {payload.__name__}\n" in text
+
+
+def test_a_rate_is_that_of_the_window() -> None:
+    meter = Meter(0)
+    for tick in range(1, 101):
+        meter.add(10, tick * 20_000_000)
+    now_ns = 2_000_000_000
+    assert meter.rate_hz(now_ns) == pytest.approx(50.0, rel=0.02)
+    assert meter.bytes_per_s(now_ns) == pytest.approx(500.0, rel=0.02)
+    assert meter.age_s(now_ns) == 0.0
+    later_ns = now_ns + round((WINDOW_S + 0.1) * 1e9)
+    assert meter.rate_hz(later_ns) == 0.0
+    assert meter.age_s(later_ns) is None
+    assert (meter.count, meter.size_bytes) == (100, 1000)
+
+
+def test_a_young_meter_does_not_understate() -> None:
+    meter = Meter(0)
+    for tick in range(1, 26):
+        meter.add(1, tick * 20_000_000)
+    assert meter.rate_hz(500_000_000) == pytest.approx(50.0)
+
+
+def test_pictures_are_summarised_and_absent_options_left_out() -> None:
+    image = m.Image(
+        stamp=1,
+        seq=2,
+        width=4,
+        height=3,
+        format="jpeg",
+        data=bytes(99),
+        intrinsics=(1.0, 1.0, 1.0, 1.0),
+        distortion=(0.0, 0.0, 0.0, 0.0),
+        capture=1,
+    )
+    assert summary(image)["data"] == "<99 bytes>"
+    stick = m.Stick(stamp=1, seq=2, vx=0.0, vy=0.0, vz=0.0, wz=0.0)
+    assert "buttons" not in summary(stick)
+
+
+@pytest.mark.parametrize(
+    ("words", "service"),
+    [
+        (["sim"], "sim"),
+        (["--vehicle", "sim", "localizer"], "localizer"),
+        (["--vehicle=sim", "localizer"], "localizer"),
+        (["--camera-fps", "30", "sim"], "sim"),
+        (["overlay", "--connect", "tcp/sim:1"], "overlay"),
+        (["--help"], None),
+        ([], None),
+    ],
+)
+def test_the_service_to_run_is_found_among_its_options(
+    words: list[str], service: str | None
+) -> None:
+    assert _service_in(words) == service
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "nan", "inf", "soon", ""])
+def test_a_duration_is_more_than_nothing(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match="seconds"):
+        options.duration(text)
+    assert options.duration("0.5") == 0.5
+
+
+def test_the_doctor_knows_what_each_extra_installs() -> None:
+    assert "mcap" in doctor._requirements_of("recorder")
+    assert "torch" in doctor._requirements_of("training")
+    assert "torch" not in doctor._requirements_of("classifier")
+
+
+def test_the_doctor_says_what_to_do_about_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "_is_installed", lambda package: package != "mcap")
+    (recorder,) = [f for f in doctor._packages() if f.subject == "packages of recorder"]
+    assert (recorder.state, recorder.text) == ("warn", "mcap missing")
+    assert "'.[recorder]'" in recorder.mend
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ([], "required"),
+        (["fly"], "invalid choice"),
+        (["run", "pilot"], "invalid choice"),
+        (["run", "sim", "--vehicle", "My Drone"], "use 1 to 32 of"),
+        (["run", "sim", "--nonsense", "1"], "unrecognized"),
+        (["run", "recorder", "--config", "absent.toml"], "no such file"),
+        (["echo", "weather"], "no topic 'weather'"),
+        (["echo", "pose", "--count", "0"], "whole number"),
+        (["record", "--seconds", "-1"], "more than 0"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_code_2(
+    words: list[str], complaint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 2
+    text = capsys.readouterr().err
+    assert complaint in text
+    assert text.count("\n") == 1
+
+
+def test_an_endpoint_that_is_none_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["topics", "--once", "--connect", "localhost:7447"]) == 2
+    text = capsys.readouterr().err
+    assert "no endpoint" in text
+    assert text.count("\n") == 1
+
+
+def test_every_command_explains_itself(capsys: pytest.CaptureFixture[str]) -> None:
+    for command in ("run", "router", "topics", "echo", "alive", "doctor", "record", "contract"):
+        with pytest.raises(SystemExit) as ended:
+            main([command, "--help"])
+        assert ended.value.code == 0
+        assert f"examples:\n  autocomplete {command}" in capsys.readouterr().out
+
+
+def test_the_help_of_a_service_lists_its_configuration(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["run", "recorder", "--help"])
+    text = capsys.readouterr().out
+    assert "--chunk-bytes" in text
+    assert "(recordings)" in text

@@ -1,0 +1,81 @@
+"""The history: points equally spaced along the way, whatever the speed."""
+
+import numpy as np
+import pytest
+from synthesis_truth import POSE_RATE_HZ, S, pose, poses
+
+from services.synthesis.history import CELL_M, History
+
+END_NS = 10 * S
+
+
+def history_of(stamped):
+    history = History()
+    for message, arrival_ns in stamped:
+        history.add(message, arrival_ns)
+    return history
+
+
+def test_slow_parts_do_not_weigh_more():
+    # From rest with the lag of the velocity loop, 0.4 s.
+    def where(t):
+        return np.array([t - 0.4 * (1.0 - np.exp(-t / 0.4)), 0.0, 1.0])
+
+    track = history_of(poses(where, 3.0)).track(0, END_NS)
+    spacing = np.diff(track.points_m[:, 0])
+    assert len(track.points_m) == pytest.approx((3.0 - 0.4) / CELL_M, abs=2)
+    assert np.all(np.abs(spacing[1:-1] - CELL_M) < 0.5 * CELL_M)
+    assert track.speed_mps == pytest.approx(1.0, abs=0.05)
+
+
+def test_noise_of_a_hover_is_hardly_a_way():
+    rng = np.random.default_rng(1)
+    track = history_of(
+        poses(lambda t: np.array([0.0, 0.0, 1.0]) + rng.normal(0.0, 0.005, 3), 4.0)
+    ).track(0, END_NS)
+    assert len(track.points_m) * CELL_M < 0.25
+
+
+def test_noise_of_poses_does_not_lengthen_the_way():
+    rng = np.random.default_rng(2)
+    track = history_of(
+        poses(lambda t: np.array([t, 0.0, 1.0]) + rng.normal(0.0, 0.01, 3), 3.0)
+    ).track(0, END_NS)
+    assert len(track.points_m) * CELL_M == pytest.approx(3.0, abs=0.2)
+
+
+def test_only_the_window_counts():
+    stamped = poses(lambda t: np.array([t, 0.0, 1.0]), 5.0)
+    track = history_of(stamped).track(stamped[-1][1] - 2 * S, stamped[-1][1])
+    assert track.points_m[0, 0] == pytest.approx(3.0, abs=0.05)
+    assert track.here_m == pytest.approx([5.0, 0.0, 1.0])
+
+
+def test_old_poses_are_forgotten():
+    track = history_of(poses(lambda t: np.array([t, 0.0, 1.0]), 15.0)).track(0, 100 * S)
+    assert track.points_m[0, 0] == pytest.approx(5.0, abs=0.05)
+
+
+@pytest.mark.parametrize("kind", ["jump", "gap", "lost"])
+def test_what_was_before_a_break_is_forgotten(kind):
+    history = history_of(poses(lambda t: np.array([t, 0.0, 1.0]), 2.0))
+    shift = np.array([5.0 if kind == "jump" else 0.0, 0.0, 0.0])
+    pause_ns = S if kind == "gap" else 0
+    if kind == "lost":
+        history.add(pose([2.0, 0.0, 1.0], status="lost"), 3 * S + S // 100)
+    for i in range(100):
+        where = np.array([2.0 + (i + 2) / POSE_RATE_HZ, 0.0, 1.0]) + shift
+        history.add(pose(where), 3 * S + pause_ns + (i + 2) * S // 100)
+    track = history.track(0, END_NS)
+    assert track.points_m[0] == pytest.approx(np.array([2.02, 0.0, 1.0]) + shift, abs=0.05)
+
+
+def test_no_poses_are_no_track():
+    assert History().track(0, END_NS) is None
+    assert history_of([(pose([0.0, 0.0, 1.0]), S)]).track(0, END_NS) is None
+
+
+def test_poses_that_arrive_together_are_no_trouble():
+    stamped = [(message, S) for message, _ in poses(lambda t: np.array([t, 0.0, 1.0]), 1.0)]
+    track = history_of(stamped).track(0, END_NS)
+    assert np.all(np.isfinite(track.points_m))

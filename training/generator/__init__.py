@@ -1,0 +1,1 @@
+"""Sticks of simulated operators: pure, and the same for the same seed."""
