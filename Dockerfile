@@ -21,7 +21,7 @@ RUN deploy/install --extra synthesis
 COPY . .
 RUN deploy/install --source
 USER autocomplete
-HEALTHCHECK --interval=15s --timeout=10s --start-period=30s CMD ["autocomplete", "alive", "synthesis"]
+HEALTHCHECK --interval=30s --timeout=10s --start-period=60s CMD ["nice", "autocomplete", "alive", "synthesis"]
 ENTRYPOINT ["autocomplete", "run", "synthesis"]
 
 FROM base AS autopilot
@@ -29,7 +29,7 @@ RUN deploy/install --extra autopilot
 COPY . .
 RUN deploy/install --source
 USER autocomplete
-HEALTHCHECK --interval=15s --timeout=10s --start-period=30s CMD ["autocomplete", "alive", "autopilot"]
+HEALTHCHECK --interval=30s --timeout=10s --start-period=60s CMD ["nice", "autocomplete", "alive", "autopilot"]
 ENTRYPOINT ["autocomplete", "run", "autopilot"]
 
 FROM base AS recorder
@@ -40,7 +40,7 @@ RUN deploy/install --source
 ENV AUTOCOMPLETE_RECORDER_FOLDER=/recordings
 VOLUME /recordings
 USER autocomplete
-HEALTHCHECK --interval=15s --timeout=10s --start-period=30s CMD ["autocomplete", "alive", "recorder"]
+HEALTHCHECK --interval=30s --timeout=10s --start-period=60s CMD ["nice", "autocomplete", "alive", "recorder"]
 ENTRYPOINT ["autocomplete", "run", "recorder"]
 
 FROM base AS operator
@@ -50,7 +50,7 @@ RUN deploy/install --source
 # A container has no screen: pads are read without one.
 ENV SDL_VIDEODRIVER=dummy SDL_AUDIODRIVER=dummy
 USER autocomplete
-HEALTHCHECK --interval=15s --timeout=10s --start-period=30s CMD ["autocomplete", "alive", "operator"]
+HEALTHCHECK --interval=30s --timeout=10s --start-period=60s CMD ["nice", "autocomplete", "alive", "operator"]
 ENTRYPOINT ["autocomplete", "run", "operator"]
 
 FROM base AS localizer
@@ -58,7 +58,7 @@ RUN deploy/install --extra localizer
 COPY . .
 RUN deploy/install --source
 USER autocomplete
-HEALTHCHECK --interval=15s --timeout=10s --start-period=30s CMD ["autocomplete", "alive", "localizer"]
+HEALTHCHECK --interval=30s --timeout=10s --start-period=60s CMD ["nice", "autocomplete", "alive", "localizer"]
 ENTRYPOINT ["autocomplete", "run", "localizer"]
 
 FROM base AS classifier
@@ -66,7 +66,7 @@ RUN deploy/install --extra classifier
 COPY . .
 RUN deploy/install --source
 USER autocomplete
-HEALTHCHECK --interval=15s --timeout=10s --start-period=30s CMD ["autocomplete", "alive", "classifier"]
+HEALTHCHECK --interval=30s --timeout=10s --start-period=60s CMD ["nice", "autocomplete", "alive", "classifier"]
 ENTRYPOINT ["autocomplete", "run", "classifier"]
 
 FROM base AS sim
@@ -78,7 +78,7 @@ RUN deploy/install --extra sim
 COPY . .
 RUN deploy/install --source
 USER autocomplete
-HEALTHCHECK --interval=15s --timeout=10s --start-period=30s CMD ["autocomplete", "alive", "sim"]
+HEALTHCHECK --interval=30s --timeout=10s --start-period=60s CMD ["nice", "autocomplete", "alive", "sim"]
 ENTRYPOINT ["autocomplete", "run", "sim"]
 
 FROM node:22-bookworm-slim AS console
@@ -96,5 +96,5 @@ RUN deploy/install --source
 ENV AUTOCOMPLETE_OVERLAY_HOST=0.0.0.0
 EXPOSE 8080
 USER autocomplete
-HEALTHCHECK --interval=15s --timeout=10s --start-period=30s CMD ["autocomplete", "alive", "overlay"]
+HEALTHCHECK --interval=30s --timeout=10s --start-period=60s CMD ["nice", "autocomplete", "alive", "overlay"]
 ENTRYPOINT ["autocomplete", "run", "overlay"]

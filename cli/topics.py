@@ -5,6 +5,7 @@ import json
 import threading
 from typing import Any
 
+from rich import box
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
@@ -94,10 +95,10 @@ def _rounded(age_s: float | None) -> float | None:
 def table_of(snapshot: dict[str, Any]) -> Table:
     """A snapshot for people."""
     alive = ", ".join(snapshot["alive"]) or "nothing"
-    table = Table(title=f"{snapshot['vehicle']}: {alive} alive", title_justify="left")
-    table.add_column("topic", no_wrap=True)
-    table.add_column("message")
-    table.add_column("from")
+    title = f"{snapshot['vehicle']}: {alive} alive"
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    for heading in ("topic", "message", "from"):
+        table.add_column(heading, no_wrap=True)
     for heading in ("rate Hz", "of", "age s", "kB/s"):
         table.add_column(heading, justify="right", no_wrap=True)
     for row in snapshot["topics"]:

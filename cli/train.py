@@ -100,11 +100,15 @@ def _run(options: argparse.Namespace) -> int:
 
 def _report(console: Console, run: "Run") -> None:
     whole = run.judged[0].whole
-    table = Table(title=f"{whole.count} primitives of {whole.operators} operators held out")
-    for heading in ("classifier", "accuracy", "weighted F1", "95 % interval"):
+    table = Table(
+        title=f"{whole.count} primitives of {whole.operators} operators held out",
+        caption="F1 is weighted by class: at the end with its 95 % interval over operators,"
+        " and so many seconds after the beginning. ECE: expected calibration error.",
+    )
+    for heading in ("classifier", "accuracy", "F1", "interval"):
         table.add_column(heading)
     for after, _ in run.judged[0].early:
-        table.add_column(f"F1 {after:g} s")
+        table.add_column(f"{after:g} s")
     table.add_column("ECE")
     for judged in run.judged:
         error = "-" if judged.calibration is None else f"{judged.calibration:.3f}"
@@ -112,7 +116,7 @@ def _report(console: Console, run: "Run") -> None:
             judged.name,
             f"{judged.whole.accuracy:.3f}",
             f"{judged.whole.f1:.3f}",
-            f"{judged.whole.interval[0]:.3f} to {judged.whole.interval[1]:.3f}",
+            f"{judged.whole.interval[0]:.3f}-{judged.whole.interval[1]:.3f}",
             *(f"{s.f1:.3f}" for _, s in judged.early),
             error,
         )

@@ -267,7 +267,7 @@ class Node:
             question = m.decode(request.payload, server.query.request)
             reply = server.handler(question, self.clock.monotonic_ns())
         except m.InvalidPayloadError as error:
-            refusal = m.QueryError(error=str(error), field=_field_in(str(error)))
+            refusal = m.QueryError(error=str(error), field=_field_in(str(error), server.query))
             request.refuse(m.encode(refusal), m.encoding_of(m.QueryError))
         except RefusedError as error:
             refusal = m.QueryError(error=str(error), field=error.field_name)
@@ -324,12 +324,12 @@ def _percentiles(samples: Iterable[float]) -> tuple[float, float]:
     return float(p50), float(p99)
 
 
-def _field_in(error: str) -> str | None:
-    """The field that a msgspec error names: the first one after `$.` or in back-quotes."""
+def _field_in(error: str, query: Query) -> str | None:
+    """The field of a request that a decoding error names, if it names one."""
     for opening, closings in (("`$.", ".[`"), ("field `", "`")):
         _, found, rest = error.partition(opening)
         if found:
             end = min((rest.find(c) for c in closings if c in rest), default=len(rest))
             return rest[:end]
     word = error.split(" ", 1)[0]
-    return word if word.isidentifier() else None
+    return word if word in query.request.__struct_fields__ else None

@@ -61,10 +61,19 @@ def run_service(
     try:
         importlib.import_module(f"services.{service}.service").wire(node, settings)
         _logger.info("%s is up", service)
-        node.run(stop)
+        return _serve(node, stop)
     except config.ConfigError as error:
         sys.stderr.write(f"{error}\n")
         return 1
     finally:
         node.close()
+
+
+def _serve(node: Node, stop: threading.Event) -> int:
+    try:
+        node.run(stop)
+    except Exception:
+        # A fault of the service, whatever its type: it must not pass for one of the user's.
+        _logger.exception("%s failed", node.service)
+        return 1
     return 0

@@ -103,9 +103,6 @@ class Run:
     parity: float
 
 
-Classify = Callable[[Windows], np.ndarray]
-
-
 def counts(multiple: float) -> dict[str, int]:
     """The thesis' counts by label, times `multiple`."""
     return {label: max(1, round(count * multiple)) for label, count in THESIS_COUNTS.items()}
@@ -185,7 +182,7 @@ def train(preset_name: str, seed: int, out: Path, progress: Progress) -> Run:
     if preset_name not in PRESETS:
         raise ValueError(f"preset {preset_name!r}: use one of {', '.join(PRESETS)}")
     preset = PRESETS[preset_name]
-    # Three seeds that no two runs share; people of different sets are different people.
+    # A seed for each set: people of different sets are different people.
     seeds = np.random.SeedSequence(seed).generate_state(3)
     training = examples_of(
         _set("training", preset.operators, preset.multiple, int(seeds[0]), progress)

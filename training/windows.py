@@ -1,5 +1,6 @@
 """Primitives as the windows that a model trains on and is judged by."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,14 @@ SHORTEST_SAMPLES = 40
 WHOLE_SHARE = 0.35
 HEAD_CUT_SHARE = 0.25
 MIRROR_SHARE = 0.5
+SPLICE_SHARE = 0.15
+"""Windows that begin with the end of another primitive, flown into this one without a pause."""
+SPLICE_SAMPLES = (20, 75)
+SETTLED_SAMPLES = 60
+"""The newer primitive is asked for once 1.2 s of it are seen."""
+JOINT_SAMPLES = 15
+SLOW = 0.15
+"""Horizontal deflections below this have no direction to join by."""
 SCALE = (0.5, 1.1)
 
 
@@ -90,15 +99,23 @@ def seen_after(examples: Examples, seconds: float | None) -> Windows:
 def random_windows(
     examples: Examples, rng: np.random.Generator, *, augment: bool = True
 ) -> Windows:
-    """One window of each example: cut at a random time, sometimes without its beginning.
+    """One window of each example: cut at a random time, some without their beginning.
+
+    Some begin with the end of another primitive.
 
     Args:
         examples: what to cut.
         rng: source of the cuts.
         augment: whether to mirror and scale as well.
     """
+    labels = examples.labels
     tracks = []
     for track in examples.tracks:
+        if rng.random() < SPLICE_SHARE:
+            joined = spliced(examples.tracks[int(rng.integers(len(labels)))], track, rng)
+            if joined is not None:
+                tracks.append(_augmented(joined, rng) if augment else joined)
+                continue
         end = len(track)
         if rng.random() > WHOLE_SHARE and end > SHORTEST_SAMPLES:
             end = int(rng.integers(SHORTEST_SAMPLES, end + 1))
@@ -106,10 +123,36 @@ def random_windows(
         if rng.random() < HEAD_CUT_SHARE and end - begin > 2 * SHORTEST_SAMPLES:
             begin = int(rng.integers(begin, end - 2 * SHORTEST_SAMPLES))
         track = track[begin:end]
-        if augment:
-            side = -1.0 if rng.random() < MIRROR_SHARE else 1.0
-            up = -1.0 if rng.random() < MIRROR_SHARE else 1.0
-            scale = rng.uniform(*SCALE)
-            track = track * np.array([scale, scale * side, scale * up], dtype=np.float32)
-        tracks.append(track)
-    return padded(tracks, examples.labels)
+        tracks.append(_augmented(track, rng) if augment else track)
+    return padded(tracks, labels)
+
+
+def _augmented(track: Array32, rng: np.random.Generator) -> Array32:
+    """A track mirrored left to right, upside down, and scaled, at random."""
+    side = -1.0 if rng.random() < MIRROR_SHARE else 1.0
+    up = -1.0 if rng.random() < MIRROR_SHARE else 1.0
+    scale = rng.uniform(*SCALE)
+    return track * np.array([scale, scale * side, scale * up], dtype=np.float32)
+
+
+def spliced(before: Array32, after: Array32, rng: np.random.Generator) -> Array32 | None:
+    """The end of one track turned and scaled into the beginning of another; None if neither fits.
+
+    Their labels' order matters: the newer one is what the operator means now.
+    """
+    # Without lead-out and lead-in, which are a pause.
+    before, after = before[:-JOINT_SAMPLES], after[JOINT_SAMPLES:]
+    share = int(rng.integers(*SPLICE_SAMPLES))
+    if len(before) < share or len(after) < max(SETTLED_SAMPLES, share):
+        return None
+    end = int(rng.integers(max(SETTLED_SAMPLES, share), len(after) + 1))
+    out = before[-JOINT_SAMPLES:].mean(axis=0)
+    into = after[:JOINT_SAMPLES].mean(axis=0)
+    speeds = math.hypot(out[0], out[1]), math.hypot(into[0], into[1])
+    if min(speeds) < SLOW:
+        return None
+    turn = math.atan2(into[1], into[0]) - math.atan2(out[1], out[0])
+    gain = speeds[1] / speeds[0]
+    c, s = gain * math.cos(turn), gain * math.sin(turn)
+    frame = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]], dtype=np.float32)
+    return np.concatenate([before[-share:] @ frame, after[:end]])[-WINDOW_SAMPLES:]

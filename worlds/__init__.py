@@ -291,7 +291,7 @@ def _paint(path: _IdealPath, segments: tuple[Segment, ...], lane: _Lane) -> list
     """A lane with white edges and a dashed yellow midline."""
 
     def line(left_m: float) -> Array:
-        return _sampled(path, segments, left_m, 0.25, math.radians(3.0))[:, :2]
+        return _sampled(path, segments, left_m, math.inf, math.radians(3.0))[:, :2]
 
     edge_m = lane.width_m / 2.0 - 0.15
     white, yellow = (0.92, 0.92, 0.9), (0.98, 0.78, 0.1)

@@ -5,8 +5,8 @@ from common.node import Node
 from services.autopilot.config import Config
 from services.autopilot.core import Autopilot, Output
 
-STICK_DEPTH = 8
-"""Sticks kept for a step that is late: a short deflection among them takes over too."""
+STREAM_DEPTH = 8
+"""Kept for a step that is late: of the sticks a short deflection takes over too."""
 
 
 def wire(node: Node, config: Config) -> None:
@@ -42,8 +42,8 @@ def wire(node: Node, config: Config) -> None:
 
     node.publishes("command", "autopilot")
     # The sticks come first: nothing else that waits may delay them.
-    node.on("stick", on_stick, depth=STICK_DEPTH)
-    node.on("pose", on_pose)
+    node.on("stick", on_stick, depth=STREAM_DEPTH)
+    node.on("pose", on_pose, depth=STREAM_DEPTH)
     node.on("vehicle", on_vehicle)
     node.on("suggestion", on_suggestion)
     node.answer("autopilot/decide", decide)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from common.clock import NS_PER_S
 from common.messages import Stick
 from common.sticks import DEAD_BAND
+from common.topics import TOPICS
 
 Array = NDArray[np.float64]
 
@@ -20,7 +21,7 @@ WINDOW_S = WINDOW_SAMPLES / MODEL_RATE_HZ
 """The thesis' 200 samples, as time: a pad at 100 Hz sends 400 in it."""
 REST_S = 0.3
 """Neutral for this long ends a motion; shorter pauses are hesitations."""
-GAP_S = 0.2
+GAP_S = TOPICS["stick"].max_age_s
 """A stick is worthless after this long, so what came before a longer gap is another motion."""
 MAX_RATE_HZ = 1000.0
 

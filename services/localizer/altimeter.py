@@ -6,20 +6,10 @@ height goes on, the floor's changes.
 """
 
 import math
-from dataclasses import dataclass
-
-from common.messages import Range
 
 _SIGMAS = 4.0
 _FLOOR_AFTER = 8
 """Readings in a row that make a new floor: 0.3 s at 25 Hz."""
-
-
-@dataclass(frozen=True)
-class Reading:
-    """A reading that is believed: measured minus expected height above the floor, in m."""
-
-    residual_m: float
 
 
 class AltimeterGate:
@@ -41,24 +31,19 @@ class AltimeterGate:
         """Whether the floor may just have changed: the last reading was refused."""
         return bool(self._refused)
 
-    def judge(
-        self, reading: Range, upright: float, expected_m: float, sigma_m: float
-    ) -> Reading | None:
-        """The reading if it is to be believed.
+    def judge(self, height_m: float, expected_m: float, sigma_m: float) -> float | None:
+        """Measured minus expected height in m, or None if the reading is not to be believed.
 
         Args:
-            reading: a distance; at or beyond `max`, or below `min`, nothing was measured.
-            upright: cosine of the beam's angle against the vertical.
-            expected_m: what the filter expects for a floor at world height 0.
-            sigma_m: how well the filter knows the height.
+            height_m: above the floor, as measured.
+            expected_m: above the world's z = 0, as the filter has it.
+            sigma_m: how well the filter knows it.
         """
-        if not reading.min <= reading.range < reading.max:
-            return None
-        residual = reading.range * upright - (expected_m - self.floor_m)
+        residual = height_m - (expected_m - self.floor_m)
         gate = max(self._jump_m, _SIGMAS * math.hypot(self._noise_m, sigma_m))
         if abs(residual) <= gate:
             self._refused.clear()
-            return Reading(residual)
+            return residual
         if self._refused and abs(residual - self._refused[-1]) > self._jump_m:
             self._refused.clear()
         self._refused.append(residual)

@@ -6,7 +6,7 @@ capture. Landed, the vehicle does not move, which also calibrates the gyroscope.
 """
 
 import math
-from collections.abc import Sequence
+from statistics import median
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -31,10 +31,16 @@ from services.localizer.ground import LEAST_HEIGHT_M, LEAST_POINTS, View, displa
 
 SOURCE = "imu+altimeter+flow"
 IMU_SILENT_S = TOPICS["imu"].max_age_s
-STAMP_JUMP_S = 0.5
-"""A gap between two samples that no longer can be bridged: the vehicle was reset, or far away."""
+STAMP_JUMP_S = 1.0
+"""A gap between two samples that cannot be bridged: another vehicle, or another time."""
+GAP_MPS2, GAP_RADPS = 2.0, 0.2
+"""How the vehicle may have moved in a gap that is bridged, one sigma."""
 ALIGN_SAMPLES = 40
 """Samples averaged at the start: 0.2 s."""
+ALIGN_SAMPLES_UNTOLD = 200
+"""The same, if the vehicle does not say its state."""
+ALIGN_READINGS = 5
+"""Altimeter readings whose median is the height at the start, so that none can spoil it."""
 BATCH = 10
 """Samples averaged for the compass and for standing still: 20 Hz."""
 LOST_POSE_PERIOD_S = 0.5
@@ -75,7 +81,10 @@ class Localizer:
     def _restart(self) -> None:
         self._filter: ErrorStateFilter | None = None
         self._alignment: list[Imu] = []
-        self._batch: list[Imu] = []
+        self._first_heights_m: list[float] = []
+        self._field = np.zeros(3)
+        self._rate_radps = np.zeros(3)
+        self._batched = 0
         self._gate = AltimeterGate(self._config.altimeter_noise_m, self._config.altimeter_jump_m)
         self._key: Key | None = None
         self._flow_refused = 0
@@ -109,17 +118,21 @@ class Localizer:
             dt_s = seconds(imu.stamp - self._filter.stamp_ns)
             if not 0.0 < dt_s < STAMP_JUMP_S:
                 self._restart()
+            elif dt_s > IMU_SILENT_S:
+                self._filter.loosen(GAP_MPS2 * dt_s, GAP_RADPS * dt_s)
         if self._imu_arrival_ns is None:
             self._altimeter_arrival_ns = self._flow_arrival_ns = now_ns
         self._imu_arrival_ns = now_ns
         if self._filter is None:
             self._align(imu)
             return None
-        self._filter.predict(
-            imu.stamp, np.array(imu.angular_velocity), np.array(imu.linear_acceleration)
-        )
-        self._batch.append(imu)
-        if len(self._batch) >= BATCH:
+        rate = np.array(imu.angular_velocity)
+        self._filter.predict(imu.stamp, rate, np.array(imu.linear_acceleration))
+        # Turned into the world one by one: in a turn, a mean in the body would lag behind.
+        self._field += self._filter.rotation @ np.array(imu.magnetic_field)
+        self._rate_radps += rate
+        self._batched += 1
+        if self._batched >= BATCH:
             self._use_batch(self._filter)
         if imu.stamp < self._next_pose_ns:
             return None
@@ -130,25 +143,31 @@ class Localizer:
 
     def on_altimeter(self, reading: Range, now_ns: int) -> None:
         """Correct the height."""
+        if not reading.min <= reading.range < reading.max:
+            return  # nothing was measured
         state = self._filter
-        if state is None:
-            return
-        height = float(state.position_m[2])
-        sigma = math.sqrt(state.covariance[2, 2])
-        floor_m = self._gate.floor_m
         # The beam goes along the body's -z; its slope is taken off.
-        upright = float(state.rotation[2, 2])
-        believed = self._gate.judge(reading, upright, height, sigma)
+        upright = 1.0 if state is None else float(state.rotation[2, 2])
+        height_m = reading.range * upright
+        if len(self._first_heights_m) < ALIGN_READINGS:
+            self._first_heights_m.append(height_m)
+            height_m = median(self._first_heights_m)
+        if state is None or len(self._first_heights_m) < ALIGN_READINGS:
+            return
+        age_s = max(state.age_s(reading.stamp), 0.0)
+        expected_m = float(state.position_m[2] - age_s * state.velocity_mps[2])
+        floor_m = self._gate.floor_m
+        residual_m = self._gate.judge(height_m, expected_m, math.sqrt(state.covariance[2, 2]))
         if self._gate.floor_m != floor_m:
             self._key = None
-        if believed is None:
+        if residual_m is None:
             return
         self._altimeter_arrival_ns = now_ns
         jacobian = np.zeros((1, SIZE))
         jacobian[0, POSITION.start + 2] = 1.0
-        jacobian[0, VELOCITY.start + 2] = -max(state.age_s(reading.stamp), 0.0)
+        jacobian[0, VELOCITY.start + 2] = -age_s
         noise = np.array([[self._config.altimeter_noise_m**2]])
-        state.correct(np.array([believed.residual_m]), jacobian, noise)
+        state.correct(np.array([residual_m]), jacobian, noise)
 
     def on_picture(self, image: Image, now_ns: int) -> None:
         """Correct by the displacement of the floor's texture since the key picture.
@@ -182,7 +201,8 @@ class Localizer:
     def _align(self, imu: Imu) -> None:
         """Level by gravity, turn by the mark and the compass, once enough samples are there."""
         self._alignment.append(imu)
-        if len(self._alignment) < ALIGN_SAMPLES:
+        needed = ALIGN_SAMPLES if self._vehicle is not None else ALIGN_SAMPLES_UNTOLD
+        if len(self._alignment) < needed:
             return
         config = self._config
         force = np.mean([sample.linear_acceleration for sample in self._alignment], axis=0)
@@ -190,14 +210,18 @@ class Localizer:
         roll = math.atan2(force[1], force[2])
         level = Rotation.from_euler("ZYX", [0.0, pitch, roll])
         yaw, yaw_sigma = config.start_yaw_rad, config.start_yaw_sigma_rad
-        compass = _compass_yaw(level.apply(_mean_field(self._alignment)))
+        field = np.mean([sample.magnetic_field for sample in self._alignment], axis=0)
+        compass = _compass_yaw(level.apply(field))
         if compass is not None and abs(wrap_angle(compass - yaw)) > COMPASS_CONTRADICTS_RAD:
             yaw, yaw_sigma = compass, config.compass_noise_rad
         in_flight = self._vehicle is not None and self._vehicle.state != "landed"
         place_sigma = config.start_in_flight_sigma_m if in_flight else config.start_sigma_m
         speed_sigma = FLYING_SPEED_SIGMA_MPS if in_flight else START_SPEED_SIGMA_MPS
+        height_m, height_sigma = 0.0, START_HEIGHT_SIGMA_M
+        if len(self._first_heights_m) == ALIGN_READINGS:
+            height_m, height_sigma = median(self._first_heights_m), config.altimeter_noise_m
         sigmas = np.array(
-            [place_sigma, place_sigma, START_HEIGHT_SIGMA_M]
+            [place_sigma, place_sigma, height_sigma]
             + [speed_sigma] * 3
             + [START_TILT_SIGMA_RAD, START_TILT_SIGMA_RAD, yaw_sigma]
             + [config.accel_bias_mps2] * 3
@@ -205,7 +229,7 @@ class Localizer:
         )
         self._filter = ErrorStateFilter(
             imu.stamp,
-            np.array([config.start_x_m, config.start_y_m, 0.0]),
+            np.array([config.start_x_m, config.start_y_m, height_m]),
             np.asarray((Rotation.from_euler("Z", yaw) * level).as_matrix()),
             sigmas,
             Noise(
@@ -220,7 +244,7 @@ class Localizer:
 
     def _use_batch(self, state: ErrorStateFilter) -> None:
         """Correct by the last samples' mean field and, on the ground, by standing still."""
-        field = state.rotation @ _mean_field(self._batch)
+        field = self._field
         yaw_error = _compass_yaw(field)
         if yaw_error is not None:
             jacobian = np.zeros((1, SIZE))
@@ -231,13 +255,13 @@ class Localizer:
             if state.surprise(residual, jacobian, noise) < COMPASS_GATE:
                 state.correct(residual, jacobian, noise)
         if self._standing:
-            rate = np.mean([sample.angular_velocity for sample in self._batch], axis=0)
+            rate = self._rate_radps / self._batched
             jacobian = np.zeros((6, SIZE))
             jacobian[0:3, VELOCITY] = jacobian[3:6, GYRO_BIAS] = np.eye(3)
             residual = np.concatenate([-state.velocity_mps, rate - state.gyro_bias_radps])
             sigmas = np.array([STANDING_SIGMA_MPS] * 3 + [STANDING_SIGMA_RADPS] * 3)
             state.correct(residual, jacobian, np.diag(sigmas**2))
-        self._batch.clear()
+        self._field, self._rate_radps, self._batched = np.zeros(3), np.zeros(3), 0
 
     def _use_flow(
         self, state: ErrorStateFilter, key: Key, picture: Picture, now: View, now_ns: int
@@ -273,7 +297,7 @@ class Localizer:
             self._flow_refused += 1
             if self._flow_refused >= FLOW_REFUSALS:
                 self._flow_refused = 0
-                state.covariance[VELOCITY, VELOCITY] += np.eye(3) * FLYING_SPEED_SIGMA_MPS**2
+                state.loosen(FLYING_SPEED_SIGMA_MPS, 0.0)
                 return False
             return True
         self._flow_refused = 0
@@ -401,11 +425,6 @@ def _euler_variances(state: ErrorStateFilter) -> tuple[float, float, float]:
         float(left @ tilt @ left),
         float(state.covariance[ROTATION.stop - 1, ROTATION.stop - 1]),
     )
-
-
-def _mean_field(samples: Sequence[Imu]) -> Array:
-    field = np.mean([sample.magnetic_field for sample in samples], axis=0)
-    return np.asarray(field, dtype=np.float64)
 
 
 def _compass_yaw(field: Array) -> float | None:

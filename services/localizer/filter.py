@@ -181,6 +181,12 @@ class ErrorStateFilter:
         covariance = self.covariance - gain @ cross.T
         self.covariance = 0.5 * (covariance + covariance.T)
 
+    def loosen(self, velocity_mps: float, rotation_rad: float) -> None:
+        """Know velocity and rotation less well, by these sigmas."""
+        diagonal = np.einsum("ii->i", self.covariance)
+        diagonal[VELOCITY] += velocity_mps**2
+        diagonal[ROTATION] += rotation_rad**2
+
     def _inject(self, error: Array) -> None:
         turn = rotation_by(error[ROTATION])
         self.position_m += error[POSITION]

@@ -11,7 +11,7 @@ LAG_S = 0.12
 """Time constant of arm and thumb (neuromuscular lag; 0.1 to 0.2 s in manual control)."""
 TREMOR_S = 0.08
 """Correlation time of the tremor."""
-HOLD = 0.04
+HOLD = 0.02
 """A thumb is held still until it should be elsewhere by more than this."""
 SPRING_S = 0.08
 """How long the springs of a stick take to centre it once it is let go."""

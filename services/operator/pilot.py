@@ -22,7 +22,7 @@ from services.operator.judgement import Drawing, ahead_of, compare, drawing_of
 from services.operator.lane import Lane
 from services.operator.route import Route
 from services.operator.sources import Deflection
-from services.operator.steering import LOOK_AHEAD_M, Climb, pursue
+from services.operator.steering import LOOK_AHEAD_M, Climb, foreseen, pursue
 
 GLANCE_S = 0.1
 """The picture is taken in ten times a second."""
@@ -53,6 +53,8 @@ NEUTRAL_STEPS = 3
 """Neutral sticks sent before asking: accepting is refused while they are deflected."""
 ANSWER_S = 2.5
 SETTLE_S = 0.8
+UNHEEDED_S = 0.5
+"""After so long of hovering against his sticks he notices, and lets go of them."""
 YIELD_S = 2.0
 """How long he keeps his hands off after somebody else has flown."""
 AGAIN_S = 3.0
@@ -173,6 +175,8 @@ class Pilot:
         self._lost = True
         self._wanted: Deflection | None = None
         self._neutral_steps = 0
+        # What his hands did that he has not seen yet, in rad a step.
+        self._turns: deque[float] = deque(maxlen=max(1, round(person.reaction_s / period_s)))
         self._since_ns = 0
         self._begin_ns: int | None = None
         self._last_true_m: np.ndarray | None = None
@@ -242,6 +246,7 @@ class Pilot:
         decision = self._think(now_ns)
         sticks = self._hands.step(self._wanted, self._period_s)
         self._neutral_steps = self._neutral_steps + 1 if sticks.is_neutral else 0
+        self._turns.append(sticks.wz * self._full.yaw_radps * self._period_s)
         return sticks, decision
 
     def _think(self, now_ns: int) -> Decision | None:
@@ -324,7 +329,14 @@ class Pilot:
         if sight is None:
             self._wanted = None
             return None
-        if self._is_at_the_end(0.0):
+        if self._sight_ns != now_ns and self._wanted is not None:
+            # Nothing new since the last look.
+            return None
+        if self._is_not_obeyed():
+            # After a gap the autopilot wants to see neutral sticks before it obeys again.
+            self._enter(Phase.SETTLING, now_ns, "the sticks do nothing")
+            return None
+        if self._is_at_the_end():
             self._enter(Phase.STOPPING, now_ns)
             return None
         _, points_m = self._lane.known(now_ns, 0.5, LOOK_AHEAD_M)
@@ -332,7 +344,8 @@ class Pilot:
             side = math.copysign(SEARCH_RADPS, self._wanted.wz if self._wanted else 1.0)
             self._wanted = Deflection(wz=side / self._full.yaw_radps)
             return None
-        steer = pursue(sight, self._lane.place, points_m[-1], self._person.speed_mps, self._full)
+        now = foreseen(sight, sum(self._turns), self._person.reaction_s)
+        steer = pursue(now, self._lane.place, points_m[-1], self._person.speed_mps, self._full)
         up = self._climb.stick(self._height_error_m(), TRIM_LIMIT, self._full)
         self._wanted = replace(steer, vz=up)
         drawing = self._drawing
@@ -371,9 +384,9 @@ class Pilot:
             self._enter(Phase.STEERING, now_ns, f"autopilot: {status[1].reason}")
             return None
         sight = self._sight
-        if sight is None:
+        if sight is None or self._sight_ns != now_ns:
             return None
-        if self._is_at_the_end(0.0):
+        if self._is_at_the_end():
             self._enter(Phase.STOPPING, now_ns)
             return Decision("cancel")
         leg, left_m = self._route.leg_at(self._lane.place.along_m)
@@ -479,10 +492,10 @@ class Pilot:
         speed_mps = self._sight.speed_mps if self._sight is not None else 0.0
         return max(speed_mps, 0.0) * self._person.reaction_s
 
-    def _is_at_the_end(self, margin_m: float) -> bool:
+    def _is_at_the_end(self) -> bool:
         laps = self._person.laps if self._route.is_closed else 1
         total_m = laps * self._route.length_m
-        return laps > 0 and self._lane.place.along_m + self._slack_m() + margin_m >= total_m
+        return laps > 0 and self._lane.place.along_m + self._slack_m() >= total_m
 
     def _is_last(self, leg_end_m: float) -> bool:
         """Whether the leg that ends there is the mission's last."""
@@ -496,6 +509,15 @@ class Pilot:
             self._status is not None
             and self._status[0] > since_ns
             and self._status[1].mode == "engaged"
+        )
+
+    def _is_not_obeyed(self) -> bool:
+        """Whether he sees that somebody else flies though he has been steering for a while."""
+        settled_ns = self._since_ns + nanoseconds(self._person.reaction_s + UNHEEDED_S)
+        return (
+            self._status is not None
+            and self._status[0] > settled_ns
+            and self._status[1].mode == "hover"
         )
 
     def _has_come_down(self) -> bool:

@@ -5,6 +5,7 @@ at distance L and `left` beside the heading has curvature 2 left / L^2.
 """
 
 import math
+from dataclasses import replace
 
 from common.frames import Array, world_to_heading
 from common.sticks import FullStick
@@ -14,11 +15,11 @@ from services.operator.sources import Deflection
 
 LOOK_AHEAD_M = 2.4
 """Just beyond the nearest ground in the picture, 2.1 m ahead at 1 m of height."""
-LEFT_GAIN_PER_S = 0.3
-LEFT_LIMIT_MPS = 0.2
 TURN_LIMIT_RADPS = 0.7
-ROOM_M = 0.6
-"""Further from the midline than this a person slows down."""
+ROOM_M = 0.5
+"""Further from the midline than this a person slows down and moves sideways as well."""
+SLOWED = 0.6
+LEFT_MPS = 0.2
 
 HEIGHT_BEGIN_M = 0.15
 HEIGHT_END_M = 0.05
@@ -42,24 +43,32 @@ class Climb:
         return math.copysign(min(max(abs(wanted), 0.15), limit), error_m)
 
 
+def foreseen(sight: Sight, turned_rad: float, delay_s: float) -> Sight:
+    """The look of `delay_s` ago as it must be now, by what his hands have done since."""
+    position_m = sight.position_m.copy()
+    position_m[:2] += delay_s * sight.velocity_mps
+    return replace(sight, position_m=position_m, yaw_rad=sight.yaw_rad + turned_rad)
+
+
 def pursue(
     sight: Sight, place: Place, target_m: Array, speed_mps: float, full: FullStick
 ) -> Deflection:
-    """Forward, a little sideways, and turn toward a point (2,) of the lane ahead."""
+    """Forward and turn, sideways too where it is narrow, toward a point (2,) of the lane ahead."""
     dx, dy = (float(each) for each in target_m - sight.position_m[:2])
     ahead_m, left_m = world_to_heading(dx, dy, sight.yaw_rad)
     distance_m = max(math.hypot(ahead_m, left_m), 0.3)
     forward_mps = speed_mps * max(0.2, ahead_m / distance_m)
+    left_mps = 0.0
     if abs(place.left_m) > ROOM_M:
-        forward_mps *= 0.6
+        forward_mps *= SLOWED
+        left_mps = -math.copysign(LEFT_MPS, place.left_m)
     if ahead_m > 0.0:
         turn_radps = forward_mps * 2.0 * left_m / (distance_m * distance_m)
     else:
         turn_radps = math.copysign(TURN_LIMIT_RADPS, left_m)
-    left_mps = -LEFT_GAIN_PER_S * place.left_m
     return Deflection(
         vx=_limited(forward_mps / full.forward_mps, 1.0),
-        vy=_limited(left_mps, LEFT_LIMIT_MPS) / full.left_mps,
+        vy=left_mps / full.left_mps,
         wz=_limited(turn_radps, TURN_LIMIT_RADPS) / full.yaw_radps,
     )
 

@@ -212,13 +212,16 @@ class Simulation:
         if request.yaw is not None:
             yaw_rad = math.remainder(request.yaw, 2.0 * math.pi)
 
-        # A new stage even in the same world: contacts that pybullet keeps would be remembered.
-        stage = Stage(world, STEP_S)
+        stage = self._stage if world is self._world else Stage(world, STEP_S)
         stage.place(_above_ground(position_m), yaw_rad)
         if stage.overlaps():
-            stage.close()
+            if stage is self._stage:
+                stage.restore(self._state)
+            else:
+                stage.close()
             raise ResetError("position", "something stands there; choose a free place")
-        self._stage.close()
+        if stage is not self._stage:
+            self._stage.close()
         self._stage, self._world = stage, world
         self._position_m, self._yaw_rad = position_m, yaw_rad
         self._seed = self._seed if request.seed is None else request.seed

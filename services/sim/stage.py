@@ -13,6 +13,7 @@ from worlds import Body, Shape, Strip, Texture, World
 HULL_M: Vector3 = (0.52, 0.52, 0.11)
 REST_HEIGHT_M = HULL_M[2] / 2.0
 """Of the body's origin when it stands on the ground."""
+_FAR_AWAY_M = 500.0
 _FRICTION = 0.8
 _RESTITUTION = 0.1
 
@@ -61,7 +62,7 @@ class Stage:
         self._ground = pybullet.createMultiBody(0.0, plane, **on)
         self._textures: dict[int, Texture] = {}
         for body in world.bodies:
-            self._textures[self._add(body)] = body.texture
+            self._textures[add_body(body, **on)] = body.texture
         hull = pybullet.createCollisionShape(
             pybullet.GEOM_BOX, halfExtents=[side / 2.0 for side in HULL_M], **on
         )
@@ -89,10 +90,22 @@ class Stage:
 
     def place(self, position_m: Vector3, yaw_rad: float) -> None:
         """Put the vehicle down at rest, level."""
-        pybullet.resetBasePositionAndOrientation(
-            self._vehicle, position_m, quaternion_of(0.0, 0.0, yaw_rad), **self._on
+        still = (0.0, 0.0, 0.0)
+        # Far away first: contacts that it has there would be remembered here.
+        for place_m in ((0.0, 0.0, _FAR_AWAY_M), position_m):
+            self._put(place_m, quaternion_of(0.0, 0.0, yaw_rad), still, still)
+
+    def restore(self, state: BodyState) -> None:
+        """Put the vehicle back into a motion it had."""
+        self._put(
+            state.position_m, state.orientation, state.velocity_mps, state.angular_velocity_radps
         )
-        pybullet.resetBaseVelocity(self._vehicle, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), **self._on)
+
+    def _put(
+        self, position_m: Vector3, turn: tuple[float, ...], velocity: Vector3, rates: Vector3
+    ) -> None:
+        pybullet.resetBasePositionAndOrientation(self._vehicle, position_m, turn, **self._on)
+        pybullet.resetBaseVelocity(self._vehicle, velocity, rates, **self._on)
         # Rays find nothing before the first detection.
         pybullet.performCollisionDetection(**self._on)
 
@@ -163,28 +176,32 @@ class Stage:
             bodies.append(Body(_SHAPES[shape[2]], size, position, orientation, texture))
         return Scene(tuple(bodies), self._world.strips, self._world.ground)
 
-    def _add(self, body: Body) -> int:
-        length, _, height = body.size_m
-        form: dict[str, Any]
-        if body.shape == "box":
-            kind, form = pybullet.GEOM_BOX, {"halfExtents": [side / 2.0 for side in body.size_m]}
-            seen = form
-        elif body.shape == "cylinder":
-            kind, form = pybullet.GEOM_CYLINDER, {"radius": length / 2.0, "height": height}
-            seen = {"radius": length / 2.0, "length": height}
-        else:
-            kind = pybullet.GEOM_SPHERE
-            form = seen = {"radius": length / 2.0}
-        return int(
-            pybullet.createMultiBody(
-                0.0,
-                pybullet.createCollisionShape(kind, **form, **self._on),
-                pybullet.createVisualShape(kind, **seen, **self._on),
-                body.position_m,
-                body.orientation,
-                **self._on,
-            )
+
+def add_body(body: Body, **on: int) -> int:
+    """Put a body of a world into the pybullet that `on` names; returns its number there."""
+    length, _, height = body.size_m
+    form: dict[str, Any]
+    if body.shape == "box":
+        kind, form = pybullet.GEOM_BOX, {"halfExtents": [side / 2.0 for side in body.size_m]}
+        seen = form
+    elif body.shape == "cylinder":
+        kind, form = pybullet.GEOM_CYLINDER, {"radius": length / 2.0, "height": height}
+        seen = {"radius": length / 2.0, "length": height}
+    else:
+        kind = pybullet.GEOM_SPHERE
+        form = seen = {"radius": length / 2.0}
+    return int(
+        pybullet.createMultiBody(
+            0.0,
+            pybullet.createCollisionShape(kind, **form, **on),
+            pybullet.createVisualShape(kind, **seen, **on),
+            body.position_m,
+            body.orientation,
+            # As plain rigid bodies: as multibodies, 160 of them make a step five times dearer.
+            useMaximalCoordinates=True,
+            **on,
         )
+    )
 
 
 def tilt_of(state: BodyState) -> float:

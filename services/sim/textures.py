@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from worlds import Texture
 
-PIXELS = 1024
+PIXELS = 512
+CANVAS = 1024
+"""Pixels that are painted."""
 _SEED = 20210
 
 Picture = NDArray[np.uint8]
@@ -40,36 +42,38 @@ def paint(texture: Texture) -> Paint:
     painter, width_m, height_m = _PAINTERS[texture]
     names = sorted(_PAINTERS)
     generator = np.random.default_rng([_SEED, names.index(texture)])
-    return Paint(painter(generator), width_m, height_m)
+    # Painted finely, then averaged: what OpenGL reads most often must fit in a cache.
+    picture = cv2.resize(painter(generator), (PIXELS, PIXELS), interpolation=cv2.INTER_AREA)
+    return Paint(np.asarray(picture, np.uint8), width_m, height_m)
 
 
 def noise(generator: np.random.Generator, cells: int, octaves: int) -> _Field:
-    """Seamless cloudy noise in [0, 1], (PIXELS, PIXELS), from `cells` cells a side upwards."""
-    total: _Field = np.zeros((PIXELS, PIXELS), np.float32)
+    """Seamless cloudy noise in [0, 1], (CANVAS, CANVAS), from `cells` cells a side upwards."""
+    total: _Field = np.zeros((CANVAS, CANVAS), np.float32)
     weight = 1.0
     for octave in range(octaves):
-        side = min(PIXELS, cells << octave)
+        side = min(CANVAS, cells << octave)
         grid = generator.random((side, side), dtype=np.float32)
         # A margin of the other side makes the enlarged picture meet itself.
         margin = min(4, side)
         wide = np.pad(grid, margin, mode="wrap")
-        scale = PIXELS // side
+        scale = CANVAS // side
         large = cv2.resize(wide, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
         begin = margin * scale
-        total += weight * large[begin : begin + PIXELS, begin : begin + PIXELS]
+        total += weight * large[begin : begin + CANVAS, begin : begin + CANVAS]
         weight *= 0.55
     low, high = np.percentile(total, [1.0, 99.0])
-    return np.clip((total - low) / (high - low), 0.0, 1.0).astype(np.float32)
+    return np.asarray(np.clip((total - low) / (high - low), 0.0, 1.0), np.float32)
 
 
 def _blend(low: _Rgb, high: _Rgb, share: _Field) -> _Field:
-    """The mix of two colours (0..1) by a field, (PIXELS, PIXELS, 3)."""
+    """The mix of two colours (0..1) by a field, (CANVAS, CANVAS, 3)."""
     begin, end = np.asarray(low, np.float32), np.asarray(high, np.float32)
     return begin + (end - begin) * share[..., None]
 
 
 def _picture(colour: _Field, alpha: _Field | None = None) -> Picture:
-    opaque = np.ones((PIXELS, PIXELS), np.float32) if alpha is None else alpha
+    opaque = np.ones((CANVAS, CANVAS), np.float32) if alpha is None else alpha
     whole = np.dstack([colour, opaque])
     return np.asarray(np.clip(whole * 255.0, 0.0, 255.0), np.uint8)
 
@@ -79,38 +83,39 @@ def _spots(
 ) -> None:
     """Scatter filled spots of a colour, each a little lighter or darker, over the seam too."""
     for _ in range(count):
-        x, y = generator.integers(0, PIXELS, 2)
+        x, y = generator.integers(0, CANVAS, 2)
         size = int(generator.integers(radius[0], radius[1] + 1))
         shade = np.asarray(rgb) * generator.uniform(0.75, 1.25)
-        for dx in (0, -PIXELS) if x + size >= PIXELS else (0,):
-            for dy in (0, -PIXELS) if y + size >= PIXELS else (0,):
+        for dx in (0, -CANVAS) if x + size >= CANVAS else (0,):
+            for dy in (0, -CANVAS) if y + size >= CANVAS else (0,):
                 cv2.circle(colour, (int(x) + dx, int(y) + dy), size, shade.tolist(), -1)
 
 
 def _asphalt(generator: np.random.Generator) -> Picture:
     colour = _blend((0.21, 0.22, 0.24), (0.40, 0.41, 0.42), noise(generator, 8, 7))
-    colour *= 0.8 + 0.4 * generator.random((PIXELS, PIXELS, 1), dtype=np.float32)
+    colour *= 0.8 + 0.4 * generator.random((CANVAS, CANVAS, 1), dtype=np.float32)
     # Stones of 1 to 4 cm, light and dark: what a camera 1 m above sees its motion by.
-    _spots(generator, colour, 900, (1, 4), (0.56, 0.55, 0.52))
-    _spots(generator, colour, 700, (1, 5), (0.12, 0.12, 0.13))
-    _spots(generator, colour, 60, (5, 10), (0.47, 0.44, 0.40))
-    for _ in range(7):
-        points = np.cumsum(generator.normal(0.0, 16.0, (14, 2)), axis=0)
-        points += generator.integers(200, PIXELS - 200, 2)
-        line = np.clip(points, 0, PIXELS - 1).astype(np.int32)
+    _spots(generator, colour, 320, (2, 8), (0.56, 0.55, 0.52))
+    _spots(generator, colour, 260, (2, 9), (0.12, 0.12, 0.13))
+    _spots(generator, colour, 16, (10, 20), (0.47, 0.44, 0.40))
+    for _ in range(2):
+        heading = np.cumsum(generator.normal(0.0, 0.35, 60)) + generator.uniform(0.0, 6.28)
+        points = np.cumsum(6.0 * np.stack([np.cos(heading), np.sin(heading)], axis=1), axis=0)
+        points += generator.integers(360, CANVAS - 360, 2)
+        line = np.clip(points, 0, CANVAS - 1).astype(np.int32)
         cv2.polylines(colour, [line], False, (0.1, 0.1, 0.11), 2)
     return _picture(colour)
 
 
 def _grass(generator: np.random.Generator) -> Picture:
     colour = _blend((0.17, 0.29, 0.09), (0.41, 0.53, 0.20), noise(generator, 8, 8))
-    for _ in range(9000):
-        x, y = generator.integers(0, PIXELS, 2)
-        dx, dy = generator.integers(-9, 10, 2)
+    for _ in range(5000):
+        x, y = generator.integers(0, CANVAS, 2)
+        dx, dy = generator.integers(-18, 19, 2)
         green = generator.uniform(0.6, 1.4) * np.asarray((0.31, 0.45, 0.14))
-        cv2.line(colour, (int(x), int(y)), (int(x + dx), int(y + dy)), green.tolist(), 1)
-    _spots(generator, colour, 130, (2, 4), (0.85, 0.82, 0.55))
-    _spots(generator, colour, 60, (3, 8), (0.33, 0.26, 0.16))
+        cv2.line(colour, (int(x), int(y)), (int(x + dx), int(y + dy)), green.tolist(), 2)
+    _spots(generator, colour, 30, (4, 8), (0.85, 0.82, 0.55))
+    _spots(generator, colour, 40, (6, 16), (0.33, 0.26, 0.16))
     return _picture(colour)
 
 
@@ -118,9 +123,9 @@ def _concrete(generator: np.random.Generator) -> Picture:
     colour = _blend((0.50, 0.50, 0.48), (0.72, 0.71, 0.68), noise(generator, 4, 8))
     _spots(generator, colour, 500, (1, 4), (0.38, 0.38, 0.37))
     # A warning band, as on the pillars of a car park.
-    rows = np.arange(PIXELS)[:, None] + np.arange(PIXELS)[None, :]
+    rows = np.arange(CANVAS)[:, None] + np.arange(CANVAS)[None, :]
     stripes = (rows // 128) % 2 == 0
-    band = np.zeros((PIXELS, PIXELS), bool)
+    band = np.zeros((CANVAS, CANVAS), bool)
     band[640:896] = True
     colour[band & stripes] = (0.95, 0.75, 0.05)
     colour[band & ~stripes] = (0.08, 0.08, 0.08)
@@ -130,7 +135,7 @@ def _concrete(generator: np.random.Generator) -> Picture:
 def _brick(generator: np.random.Generator) -> Picture:
     colour = _blend((0.60, 0.58, 0.54), (0.72, 0.70, 0.66), noise(generator, 16, 6))
     rows, columns = 16, 8
-    height, width = PIXELS // rows, PIXELS // columns
+    height, width = CANVAS // rows, CANVAS // columns
     for row in range(rows):
         for column in range(columns + 1):
             x = column * width - (row % 2) * width // 2
@@ -148,15 +153,16 @@ def _brick(generator: np.random.Generator) -> Picture:
 
 
 def _crate(generator: np.random.Generator) -> Picture:
-    stretched = cv2.resize(noise(generator, 32, 5), (PIXELS * 4, PIXELS))[:, :PIXELS]
+    wide = cv2.resize(noise(generator, 32, 5), (CANVAS * 4, CANVAS))
+    stretched = np.asarray(wide[:, :CANVAS], np.float32)
     colour = _blend((0.45, 0.30, 0.16), (0.78, 0.58, 0.34), stretched)
-    for row in range(0, PIXELS, 128):
+    for row in range(0, CANVAS, 128):
         colour[row : row + 128] *= generator.uniform(0.8, 1.15)
         colour[row : row + 8] *= 0.35
     frame = 90
-    edge = np.zeros((PIXELS, PIXELS), np.uint8)
-    cv2.rectangle(edge, (0, 0), (PIXELS - 1, PIXELS - 1), 1, frame * 2)
-    cv2.line(edge, (0, PIXELS), (PIXELS, 0), 1, frame)
+    edge = np.zeros((CANVAS, CANVAS), np.uint8)
+    cv2.rectangle(edge, (0, 0), (CANVAS - 1, CANVAS - 1), 1, frame * 2)
+    cv2.line(edge, (0, CANVAS), (CANVAS, 0), 1, frame)
     colour[edge > 0] = colour[edge > 0] * 0.55 + np.asarray((0.38, 0.25, 0.12))
     outline = cv2.morphologyEx(edge, cv2.MORPH_GRADIENT, np.ones((9, 9), np.uint8))
     colour[outline > 0] *= 0.4
@@ -164,18 +170,18 @@ def _crate(generator: np.random.Generator) -> Picture:
 
 
 def _container(generator: np.random.Generator) -> Picture:
-    wave = 0.5 + 0.5 * np.sin(np.arange(PIXELS) * (2.0 * np.pi * 20 / PIXELS))
-    ribs = np.repeat((0.62 + 0.5 * wave)[None, :], PIXELS, axis=0).astype(np.float32)
+    wave = 0.5 + 0.5 * np.sin(np.arange(CANVAS) * (2.0 * np.pi * 20 / CANVAS))
+    ribs = np.repeat((0.62 + 0.5 * wave)[None, :], CANVAS, axis=0).astype(np.float32)
     colour = _blend((0.05, 0.22, 0.38), (0.13, 0.38, 0.58), noise(generator, 8, 7))
     colour *= ribs[..., None]
     rust = noise(generator, 8, 7) > 0.87
     colour[rust] = colour[rust] * 0.4 + np.asarray((0.30, 0.14, 0.06))
-    cv2.rectangle(colour, (0, 0), (PIXELS - 1, PIXELS - 1), (0.05, 0.14, 0.22), 40)
-    letters = np.zeros((PIXELS, PIXELS), np.uint8)
+    cv2.rectangle(colour, (0, 0), (CANVAS - 1, CANVAS - 1), (0.05, 0.14, 0.22), 40)
+    letters = np.zeros((CANVAS, CANVAS), np.uint8)
     for text, y, size in (("AUTOCOMPLETE", 430, 3.4), ("ARD 420 530 2", 640, 2.4)):
         (wide, _), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_DUPLEX, size, 10)
         cv2.putText(
-            letters, text, ((PIXELS - wide) // 2, y), cv2.FONT_HERSHEY_DUPLEX, size, 255, 10
+            letters, text, ((CANVAS - wide) // 2, y), cv2.FONT_HERSHEY_DUPLEX, size, 255, 10
         )
     colour[letters > 0] = (0.90, 0.92, 0.92)
     return _picture(colour)
@@ -184,7 +190,7 @@ def _container(generator: np.random.Generator) -> Picture:
 def _foliage(generator: np.random.Generator) -> Picture:
     colour = _blend((0.05, 0.14, 0.04), (0.20, 0.36, 0.11), noise(generator, 16, 6))
     for _ in range(5000):
-        x, y = (int(each) for each in generator.integers(0, PIXELS, 2))
+        x, y = (int(each) for each in generator.integers(0, CANVAS, 2))
         axes = (int(generator.integers(5, 14)), int(generator.integers(3, 7)))
         green = generator.uniform(0.4, 1.7) * np.asarray((0.20, 0.37, 0.11))
         cv2.ellipse(
@@ -195,27 +201,27 @@ def _foliage(generator: np.random.Generator) -> Picture:
 
 def _post(generator: np.random.Generator) -> Picture:
     colour = _blend((0.78, 0.78, 0.78), (0.92, 0.92, 0.92), noise(generator, 8, 5))
-    for begin in range(0, PIXELS, 256):
+    for begin in range(0, CANVAS, 256):
         colour[begin : begin + 128] *= np.asarray((0.20, 0.21, 0.24), np.float32)
     return _picture(colour)
 
 
 def _fence(generator: np.random.Generator) -> Picture:
     """A panel 1.6 m high: a board of red and white fields below, a net above, a tape on top."""
-    colour = np.empty((PIXELS, PIXELS, 3), np.float32)
+    colour = np.empty((CANVAS, CANVAS, 3), np.float32)
     colour[:] = (0.16, 0.18, 0.20)
-    alpha = np.zeros((PIXELS, PIXELS), np.float32)
+    alpha = np.zeros((CANVAS, CANVAS), np.float32)
     # Net: meshes of about 10 cm.
-    for at in range(0, PIXELS, 64):
+    for at in range(0, CANVAS, 64):
         alpha[at : at + 7, :] = 1.0
-    for at in range(0, PIXELS, 42):
+    for at in range(0, CANVAS, 42):
         alpha[:, at : at + 5] = 1.0
     tape = slice(0, 44)
     alpha[tape] = 1.0
     colour[tape] = (0.96, 0.45, 0.05)
-    board = slice(724, PIXELS)
+    board = slice(724, CANVAS)
     alpha[board] = 1.0
-    slope = np.arange(PIXELS)[None, :] + np.arange(PIXELS - 724)[:, None]
+    slope = np.arange(CANVAS)[None, :] + np.arange(CANVAS - 724)[:, None]
     red = (slope // 128) % 2 == 0
     colour[board] = np.where(red[..., None], (0.80, 0.08, 0.07), (0.93, 0.93, 0.91))
     dirt = noise(generator, 16, 6)
@@ -228,8 +234,8 @@ def _fence(generator: np.random.Generator) -> Picture:
 _PAINTERS: dict[
     Texture, tuple[Callable[[np.random.Generator], Picture], float | None, float | None]
 ] = {
-    "asphalt": (_asphalt, 4.0, 4.0),
-    "grass": (_grass, 4.0, 4.0),
+    "asphalt": (_asphalt, 2.0, 2.0),
+    "grass": (_grass, 2.0, 2.0),
     "concrete": (_concrete, 2.0, 2.0),
     "fence": (_fence, 2.5, None),
     "post": (_post, 1.0, 0.8),
@@ -238,6 +244,12 @@ _PAINTERS: dict[
     "container": (_container, None, None),
     "foliage": (_foliage, 3.0, 3.0),
 }
+
+
+def patches() -> Picture:
+    """Seamless cloudy light and dark, (PIXELS, PIXELS, 1)."""
+    field = noise(np.random.default_rng(_SEED), 16, 6)
+    return np.asarray(cv2.resize(field, (PIXELS, PIXELS)) * 255.0, np.uint8)[..., None]
 
 
 def sky(generator: np.random.Generator | None = None) -> Picture:

@@ -72,12 +72,12 @@ class History:
             return None
         time_s = np.array([seconds(ns - chosen[-1][0]) for ns, _ in chosen])
         position_m = np.array([pose.position for _, pose in chosen])
-        way_m, speed_mps = _way(time_s, position_m)
+        way_m = _way(time_s, position_m)
         return Track(
             _means(position_m, np.floor(way_m / CELL_M)),
             position_m[-1],
             yaw_of(chosen[-1][1].orientation),
-            speed_mps,
+            _recent_speed(time_s, way_m),
         )
 
 
@@ -88,22 +88,21 @@ def _means(values: Array, labels: Array) -> Array:
     return np.asarray(np.add.reduceat(values, starts, axis=0) / counts[:, None])
 
 
-def _way(time_s: Array, position_m: Array) -> tuple[Array, float]:
-    """Length (N,) of the way flown up to each position, and the recent mean speed."""
+def _way(time_s: Array, position_m: Array) -> Array:
+    """Length (N,) of the way flown up to each position."""
     labels = np.floor((time_s - time_s[0]) / SMOOTH_S)
     smooth = _means(np.column_stack([time_s, position_m]), labels)
     if len(smooth) < 2:
-        return np.zeros(len(time_s)), 0.0
-    steps = np.linalg.norm(np.diff(smooth[:, 1:], axis=0), axis=1)
-    way = np.concatenate([[0.0], np.cumsum(steps)])
-    recent = smooth[:, 0] >= smooth[-1, 0] - SPEED_S
-    first = int(np.argmax(recent))
-    first = min(first, len(smooth) - 2)
-    elapsed = float(smooth[-1, 0] - smooth[first, 0])
-    speed = float(way[-1] - way[first]) / elapsed if elapsed > 0.0 else 0.0
+        return np.zeros(len(time_s))
+    times, steps = smooth[:, 0], np.linalg.norm(np.diff(smooth[:, 1:], axis=0), axis=1)
     # Beyond the outer means the speed is that of the nearest step.
-    before = (time_s - smooth[0, 0]) * steps[0] / (smooth[1, 0] - smooth[0, 0])
-    after = (time_s - smooth[-1, 0]) * steps[-1] / (smooth[-1, 0] - smooth[-2, 0])
-    inside = np.interp(time_s, smooth[:, 0], way)
-    total = inside + np.minimum(before, 0.0) + np.maximum(after, 0.0)
-    return np.maximum.accumulate(total - total[0]), speed
+    segment = np.clip(np.searchsorted(times, time_s) - 1, 0, len(steps) - 1)
+    into = (time_s - times[segment]) / np.diff(times)[segment]
+    way = np.concatenate([[0.0], np.cumsum(steps)])[segment] + into * steps[segment]
+    return np.asarray(way - way[0])
+
+
+def _recent_speed(time_s: Array, way_m: Array) -> float:
+    first = min(int(np.searchsorted(time_s, time_s[-1] - SPEED_S)), len(time_s) - 2)
+    elapsed_s = float(time_s[-1] - time_s[first])
+    return float(way_m[-1] - way_m[first]) / elapsed_s if elapsed_s > 0.0 else 0.0

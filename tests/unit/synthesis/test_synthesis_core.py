@@ -2,6 +2,7 @@
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -156,8 +157,6 @@ def test_every_refusal_has_its_reason():
 
 
 def unknown_intent():
-    import msgspec
-
     probabilities = {"line": 0.1, "arc": 0.1, "sine": 0.1, "helix": 0.1, "spiral": 0.6}
     return msgspec.structs.replace(intent("none"), label="spiral", probabilities=probabilities)
 
@@ -170,7 +169,7 @@ def test_a_good_suggestion_clears_the_refusal():
     assert synthesizer.last_refusal is None
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     label=st.sampled_from(["line", "arc", "sine", "helix"]),
     seed=st.integers(0, 10_000),

@@ -1,0 +1,42 @@
+"""How many steps are due: simulated time follows a real clock, catching up small lags."""
+
+from collections import deque
+
+from common.clock import NS_PER_S
+from services.sim.core import PHYSICS_HZ
+
+MAX_LAG_NS = NS_PER_S // 2
+"""A longer lag is given up: simulated time slips behind the clock."""
+_WINDOW_NS = 5 * NS_PER_S
+
+
+class Pace:
+    """Counts the steps due by a monotonic clock."""
+
+    def __init__(self, now_ns: int) -> None:
+        self._begin_ns = now_ns
+        self._steps = 0
+        self.slipped_ns = 0
+        self._history: deque[tuple[int, int]] = deque([(now_ns, 0)])
+
+    def due(self, now_ns: int) -> int:
+        """The steps to do now."""
+        lag_ns = now_ns - self._begin_ns - self._steps * NS_PER_S // PHYSICS_HZ
+        if lag_ns > MAX_LAG_NS:
+            self._begin_ns += lag_ns
+            self.slipped_ns += lag_ns
+            lag_ns = 0
+        steps = lag_ns * PHYSICS_HZ // NS_PER_S
+        self._steps += steps
+        self._history.append((now_ns, self._steps))
+        while now_ns - self._history[0][0] > _WINDOW_NS:
+            self._history.popleft()
+        return steps
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated over real time in the last 5 s."""
+        (begin_ns, begin), (end_ns, end) = self._history[0], self._history[-1]
+        if end_ns == begin_ns:
+            return 1.0
+        return (end - begin) * NS_PER_S / PHYSICS_HZ / (end_ns - begin_ns)

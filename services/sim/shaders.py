@@ -1,0 +1,143 @@
+"""What OpenGL runs for each vertex and each pixel (GLSL 3.30); see renderer.py.
+
+Bodies come as instances: a unit mesh, placed by `at`, `turn` (a quaternion) and `size`, with a
+texture of a layer whose repetition measures `extent` m (0: fitted to the face). Colours leave as
+BGR, the order that OpenCV encodes.
+"""
+
+SUN = (-0.42, -0.33, 0.845)
+"""Towards it, world."""
+MAX_LAYERS = 16
+
+_HEAD = f"""
+#version 330
+const vec3 SUN = vec3{SUN};
+const int MAX_LAYERS = {MAX_LAYERS};
+"""
+
+_PLACED = """
+uniform vec2 extent[MAX_LAYERS];
+in vec3 in_position; in vec2 in_uv; in vec3 in_across; in vec3 in_up;
+in vec3 at; in vec4 turn; in vec3 size; in float layer;
+vec3 turned(vec3 v) { return v + 2.0 * cross(turn.xyz, cross(turn.xyz, v) + turn.w * v); }
+vec3 placed() { return at + turned(in_position * size); }
+vec3 uv_in_repeats() {
+    vec2 side_m = vec2(dot(abs(in_across), size), dot(abs(in_up), size));
+    vec2 repeat_m = extent[int(layer)];
+    vec2 repeats = vec2(repeat_m.x > 0.0 ? side_m.x / repeat_m.x : 1.0,
+                        repeat_m.y > 0.0 ? side_m.y / repeat_m.y : 1.0);
+    return vec3(in_uv * repeats, layer);
+}
+"""
+
+_HAZE = """
+const vec3 HAZE = vec3(0.78, 0.87, 0.93);
+// By depth; an exponential would cost more than it shows.
+vec3 hazy(vec3 colour) { return mix(HAZE, colour, 1.0 / (1.0 + 0.007 / gl_FragCoord.w)); }
+"""
+
+BODY_VERTEX = f"""{_HEAD}{_PLACED}
+uniform mat4 from_world;
+in vec3 in_normal;
+out vec3 uv; out float light;
+void main() {{
+    vec3 normal = normalize(turned(in_normal / size));
+    light = 0.50 + 0.12 * normal.z + 0.58 * max(dot(normal, SUN), 0.0);
+    uv = uv_in_repeats();
+    gl_Position = from_world * vec4(placed(), 1.0);
+}}
+"""
+BODY_FRAGMENT = f"""{_HEAD}{_HAZE}
+uniform sampler2DArray textures;
+in vec3 uv; in float light;
+out vec4 bgra;
+void main() {{
+    vec4 texel = texture(textures, uv);
+    bgra = vec4(hazy(texel.rgb * light).bgr, texel.a);
+}}
+"""
+
+# Seen from above through a window (corner, and 1 over its sides): how much light is left.
+SHADOW_VERTEX = f"""{_HEAD}{_PLACED}
+uniform vec4 window;
+out vec3 uv;
+void main() {{
+    vec3 world = placed();
+    vec2 fallen = world.xy - SUN.xy / SUN.z * max(world.z, 0.0);
+    uv = uv_in_repeats();
+    gl_Position = vec4((fallen - window.xy) * window.zw * 2.0 - 1.0, 0.0, 1.0);
+}}
+"""
+SHADOW_FRAGMENT = """
+#version 330
+uniform sampler2DArray textures;
+in vec3 uv;
+out float shade;
+void main() { shade = 0.8 - 0.4 * textureLod(textures, uv, 2.0).a; }
+"""
+PATCHES_VERTEX = """
+#version 330
+in vec2 corner;
+out vec2 at;
+void main() { at = corner; gl_Position = vec4(corner, 0.0, 1.0); }
+"""
+PATCHES_FRAGMENT = """
+#version 330
+uniform sampler2D patches;
+in vec2 at;
+out float shade;
+void main() {
+    // Even at the edges, which go on for ever.
+    vec2 inside = clamp((1.0 - abs(at)) * 8.0, 0.0, 1.0);
+    shade = 0.8 + (texture(patches, at * 1.7).r - 0.5) * 0.36 * inside.x * inside.y;
+}
+"""
+
+GROUND_VERTEX = """
+#version 330
+uniform mat4 from_world;
+uniform vec4 window;
+uniform float height_m;
+in vec2 in_position; in vec2 in_uv;
+out vec2 uv; out vec2 light_uv;
+void main() {
+    uv = in_uv;
+    light_uv = (in_position - window.xy) * window.zw;
+    gl_Position = from_world * vec4(in_position, height_m, 1.0);
+}
+"""
+GROUND_FRAGMENT = f"""{_HEAD}{_HAZE}
+uniform sampler2DArray textures;
+uniform sampler2D light;
+uniform float layer;
+uniform vec3 tint;
+uniform float dash_m;
+in vec2 uv; in vec2 light_uv;
+out vec4 bgra;
+void main() {{
+    if (dash_m > 0.0 && fract(uv.x / (2.0 * dash_m)) > 0.5) discard;
+    vec3 colour = tint * texture(light, light_uv).r * 1.25;
+    if (layer >= 0.0) colour *= texture(textures, vec3(uv, layer)).rgb;
+    bgra = vec4(hazy(colour).bgr, 1.0);
+}}
+"""
+
+SKY_VERTEX = """
+#version 330
+uniform mat4 from_world;
+uniform vec3 eye;
+in vec3 in_position; in vec2 in_uv;
+out vec2 uv;
+void main() {
+    uv = in_uv;
+    // As far as depth goes.
+    gl_Position = (from_world * vec4(eye + in_position * 100.0, 1.0)).xyww;
+}
+"""
+SKY_FRAGMENT = """
+#version 330
+uniform sampler2D picture;
+in vec2 uv;
+out vec4 bgra;
+void main() { bgra = vec4(texture(picture, uv).bgr, 1.0); }
+"""

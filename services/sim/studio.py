@@ -1,0 +1,156 @@
+"""Takes the pictures on a thread of its own; what it cannot take in time is dropped."""
+
+import logging
+import threading
+from collections import Counter
+from collections.abc import Callable
+from typing import Literal, Protocol
+
+from common import messages as m
+from services.sim.core import Camera, Shot
+from services.sim.renderer import GlRenderer, NoOpenGlError, jpeg_of
+from services.sim.stage import Scene
+from services.sim.textures import Picture
+
+log = logging.getLogger(__name__)
+
+Choice = Literal["auto", "gl", "tiny", "none"]
+
+
+class Renderer(Protocol):
+    """Draws pictures of a scene."""
+
+    @property
+    def name(self) -> str:
+        """What draws, for people."""
+        ...
+
+    def load(self, scene: Scene) -> None:
+        """Draw this scene from now on."""
+        ...
+
+    def draw(self, camera: Camera, shot: Shot) -> Picture:
+        """The picture (height, width, 3) in BGR."""
+        ...
+
+    def close(self) -> None:
+        """Free everything."""
+        ...
+
+
+def open_renderer(choice: Choice) -> Renderer:
+    """The renderer of a choice; auto is OpenGL where there is any.
+
+    Raises:
+        NoOpenGlError: if OpenGL was asked for and there is none.
+    """
+    if choice != "tiny":
+        try:
+            return GlRenderer()
+        except NoOpenGlError as error:
+            if choice == "gl":
+                raise
+            log.warning("no OpenGL (%s): pictures are drawn slowly by pybullet", error)
+    from services.sim.tiny import TinyRenderer
+
+    return TinyRenderer()
+
+
+def photograph(renderer: Renderer, camera: Camera, shot: Shot, quality: int) -> m.Image:
+    """The message of one picture."""
+    return m.Image(
+        stamp=shot.stamp_ns,
+        seq=0,
+        width=camera.lens.width,
+        height=camera.lens.height,
+        format="jpeg",
+        data=jpeg_of(renderer.draw(camera, shot), quality),
+        intrinsics=camera.lens.intrinsics,
+        distortion=camera.lens.distortion,
+        capture=shot.stamp_ns,
+    )
+
+
+class Studio:
+    """Cameras that never hold up physics: the newest shot of each waits, older ones are dropped.
+
+    Args:
+        choice: of the renderer.
+        cameras: by their topics.
+        quality: of the JPEG.
+        publish: called on the studio's thread with each picture.
+    """
+
+    def __init__(
+        self,
+        choice: Choice,
+        cameras: tuple[Camera, ...],
+        quality: int,
+        publish: Callable[[str, m.Message], None],
+    ) -> None:
+        self._choice = choice
+        self._cameras = {camera.topic: camera for camera in cameras}
+        self._quality = quality
+        self._publish = publish
+        self._wake = threading.Condition()
+        self._shots: dict[str, Shot] = {}
+        self._scene: Scene | None = None
+        self._stopping = False
+        self.taken: Counter[str] = Counter()
+        self.dropped: Counter[str] = Counter()
+        self.renderer = "starting"
+        self.failure = ""
+        self._thread = threading.Thread(target=self._run, name="studio", daemon=True)
+        self._thread.start()
+
+    def load(self, scene: Scene) -> None:
+        """Take pictures of this scene from now on."""
+        with self._wake:
+            self._scene = scene
+            self._shots.clear()
+            self._wake.notify()
+
+    def take(self, shots: tuple[Shot, ...]) -> None:
+        """Have pictures taken soon, or not at all if newer ones are asked for first."""
+        with self._wake:
+            for shot in shots:
+                if shot.topic in self._shots:
+                    self.dropped[shot.topic] += 1
+                self._shots[shot.topic] = shot
+            self._wake.notify()
+
+    def close(self) -> None:
+        """Stop, after the picture that is being taken."""
+        with self._wake:
+            self._stopping = True
+            self._wake.notify()
+        self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            renderer = open_renderer(self._choice)
+            self.renderer = renderer.name
+            log.info("pictures are drawn by %s", renderer.name)
+            while self._take_next(renderer):
+                pass
+            renderer.close()
+        except Exception as error:
+            self.failure = str(error)
+            log.exception("no more pictures")
+
+    def _take_next(self, renderer: Renderer) -> bool:
+        """Wait for work and do it; False when it is time to stop."""
+        with self._wake:
+            while not (self._shots or self._scene or self._stopping):
+                self._wake.wait()
+            if self._stopping:
+                return False
+            scene, self._scene = self._scene, None
+            shots, self._shots = self._shots, {}
+        if scene is not None:
+            renderer.load(scene)
+        for topic, shot in shots.items():
+            picture = photograph(renderer, self._cameras[topic], shot, self._quality)
+            self._publish(topic, picture)
+            self.taken[topic] += 1
+        return True
