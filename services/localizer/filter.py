@@ -27,6 +27,8 @@ SIZE = 21
 
 _HISTORY = 64
 """Past states kept: 0.32 s at 200 Hz, more than a picture takes to arrive."""
+_REACH_S = 0.02
+"""From one sample to a stamp after it, by its rates."""
 
 
 def cross_matrix(vector: Array) -> Array:
@@ -123,15 +125,15 @@ class ErrorStateFilter:
         self._remember()
 
     def at(self, stamp_ns: int) -> Snapshot | None:
-        """The nominal pose at a stamp, or None if it lies before what is remembered.
+        """The nominal pose at a stamp, from the last sample before it.
 
-        A stamp a little ahead of the newest sample is reached with the newest rates.
+        None if that sample is forgotten, or was too long before.
         """
-        ages_ns = np.where(self._past_ns >= 0, stamp_ns - self._past_ns, -1)
-        if not np.any(ages_ns >= 0):
+        known = (self._past_ns >= 0) & (self._past_ns <= stamp_ns)
+        index = int(np.argmax(np.where(known, self._past_ns, -1)))
+        dt_s = seconds(stamp_ns - int(self._past_ns[index]))
+        if not known[index] or dt_s > _REACH_S:
             return None
-        index = int(np.argmin(np.where(ages_ns >= 0, ages_ns, np.iinfo(np.int64).max)))
-        dt_s = seconds(int(ages_ns[index]))
         return Snapshot(
             stamp_ns,
             self._past_position_m[index] + self._past_velocity_mps[index] * dt_s,

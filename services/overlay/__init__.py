@@ -1,0 +1,1 @@
+"""Draws the suggested path into the live picture, and serves the console."""

@@ -15,7 +15,7 @@ from common.clock import NS_PER_S
 from common.topics import TOPICS
 from services.sim import sensors
 from services.sim.config import PLANTS, Config
-from services.sim.plant import Quaternion, TumPlant, Vector3
+from services.sim.plant import BodyState, Quaternion, TumPlant, Vector3
 from services.sim.stage import REST_HEIGHT_M, Scene, Stage
 from services.sim.vehicle import StickNoise, Vehicle
 
@@ -136,6 +136,11 @@ class Simulation:
     def world(self) -> str:
         """Where the vehicle is."""
         return self._world.name
+
+    @property
+    def state(self) -> BodyState:
+        """The vehicle's motion after the last step."""
+        return self._state
 
     def scene(self) -> Scene:
         """What cameras see."""

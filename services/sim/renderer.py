@@ -156,7 +156,7 @@ class GlRenderer:
         data = np.stack([each.picture[::-1] for each in paints])
         self._textures = self._gl.texture_array((PIXELS, PIXELS, len(paints)), 4, data.tobytes())
         self._textures.build_mipmaps()
-        self._textures.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        self._textures.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
         self._extent = np.zeros((shaders.MAX_LAYERS, 2))
         for index, each in enumerate(paints):
             self._extent[index] = (each.width_m or 0.0, each.height_m or 0.0)
@@ -265,7 +265,9 @@ class GlRenderer:
 
         add(corners, corners, scene.ground, (1.0, 1.0, 1.0), None)
         for strip in scene.strips:
-            points, uv_m = meshes.ribbon(strip)
+            points, along_m = meshes.ribbon(strip)
+            # A texture lies flat on the world, so that it bends and stretches nowhere.
+            uv_m = along_m if strip.texture is None else points
             add(points, uv_m, strip.texture, strip.colour, strip.dash_m)
         # Top paint first and a little higher, so that it hides what is under it from painting.
         self._ground = [(PAINT_M * up, each) for up, each in enumerate(layers_up)][::-1]

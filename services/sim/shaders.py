@@ -89,7 +89,7 @@ out float shade;
 void main() {
     // Even at the edges, which go on for ever.
     vec2 inside = clamp((1.0 - abs(at)) * 8.0, 0.0, 1.0);
-    shade = 0.8 + (texture(patches, at * 1.7).r - 0.5) * 0.36 * inside.x * inside.y;
+    shade = 0.8 + (texture(patches, at * 1.7).r - 0.5) * 0.26 * inside.x * inside.y;
 }
 """
 

@@ -51,7 +51,7 @@ class Stage:
 
     def __init__(self, world: World, step_s: float) -> None:
         self._world = world
-        self._id = pybullet.connect(pybullet.DIRECT)
+        self._id = int(pybullet.connect(pybullet.DIRECT))
         on = {"physicsClientId": self._id}
         self._on = on
         pybullet.setGravity(0.0, 0.0, -GRAVITY_MPS2, **on)
@@ -83,6 +83,11 @@ class Stage:
             activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
             **on,
         )
+
+    @property
+    def client(self) -> int:
+        """Its number in pybullet."""
+        return self._id
 
     def close(self) -> None:
         """Leave pybullet."""

@@ -356,10 +356,17 @@ class TestLosses:
 def test_commands_and_status_come_at_their_rates_in_order(client, drone):
     decide(client, "land")
     commands, statuses = client.collect("command"), client.collect("autopilot")
-    at = len(commands), len(statuses)
-    time.sleep(1.0)
-    assert 45 <= len(commands) - at[0] <= 55
-    assert 18 <= len(statuses) - at[1] <= 23
+    counts = []
+    for _ in range(5):
+        at = len(commands), len(statuses)
+        time.sleep(1.0)
+        counts.append((len(commands) - at[0], len(statuses) - at[1]))
+        if counts[-1][0] >= 45 and counts[-1][1] >= 18:
+            break
+    # A busy machine may miss periods; they are never made up.
+    assert counts[-1][0] >= 45, counts
+    assert counts[-1][1] >= 18, counts
+    assert all(many <= 55 and few <= 23 for many, few in counts), counts
     for topic, name in (("command", "Command"), ("autopilot", "AutopilotStatus")):
         collected = client.collect(topic)
         assert set(collected.encodings) == {f"application/msgpack;{name}/1"}

@@ -14,6 +14,7 @@ import numpy as np
 from common.frames import Array
 from services.synthesis.config import Config
 from services.synthesis.primitives.shape import (
+    MAX_STEPS,
     STEP_M,
     Quality,
     Shape,
@@ -163,10 +164,11 @@ def fit_circle(points_m: Array) -> Circle:
     return Circle(centre, radius, radius_std, angles, off)
 
 
-def angles_ahead(start_rad: float, sense: float, radius_m: float, half_turns: int) -> Array:
+def angles_ahead(start_rad: float, sense: float, half_turn_m: float, half_turns: int) -> Array:
     """Angles from a start on: 64 steps a half turn, more where that leaves steps over `STEP_M`."""
-    steps = half_turns * max(POINTS_PER_HALF_TURN, math.ceil(math.pi * radius_m / STEP_M))
-    return np.asarray(start_rad + sense * np.linspace(0.0, half_turns * math.pi, steps + 1))
+    steps = half_turns * max(POINTS_PER_HALF_TURN, math.ceil(half_turn_m / STEP_M))
+    ways = np.linspace(0.0, half_turns * math.pi, min(steps, MAX_STEPS) + 1)
+    return np.asarray(start_rad + sense * ways)
 
 
 @dataclass(frozen=True)
@@ -217,7 +219,7 @@ class Arc(Shape):
     def ahead(self) -> Array:
         """One lap, whose last point is its first."""
         circle = self.circle
-        angles = angles_ahead(self.start_rad, circle.sense, circle.radius_m, half_turns=2)
+        angles = angles_ahead(self.start_rad, circle.sense, math.pi * circle.radius_m, 2)
         xy = circle.centre_m + circle.radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
         xy[-1] = xy[0]
         return np.column_stack([xy, np.full(len(xy), self.height_m)])

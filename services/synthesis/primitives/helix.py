@@ -17,6 +17,8 @@ from services.synthesis.primitives.shape import Quality, Shape, UnfitError
 TURNS = 3
 MIN_PITCH_M = 0.1
 """Less than this a turn is an arc whose height was not held."""
+MAX_SLOPE = 2.0
+"""Climb per way flown level; steeper, the turn is lost in the drift of a climb."""
 MIN_PITCH_SIGMAS = 3.0
 
 
@@ -80,11 +82,14 @@ class Helix(Shape):
         self.circle.check(config)
         if abs(self.pitch_m) < max(MIN_PITCH_M, MIN_PITCH_SIGMAS * self.pitch_std_m):
             raise UnfitError(f"it climbs only {self.pitch_m:.2f} m a turn", "arc")
+        if abs(self.pitch_m) > MAX_SLOPE * 2.0 * math.pi * self.circle.radius_m:
+            raise UnfitError(f"it climbs {self.pitch_m:.1f} m a turn, too steeply to turn")
 
     def ahead(self) -> Array:
         """Three turns."""
         circle = self.circle
-        angles = angles_ahead(self.start_rad, circle.sense, circle.radius_m, 2 * TURNS)
+        half_turn_m = math.hypot(math.pi * circle.radius_m, self.pitch_m / 2.0)
+        angles = angles_ahead(self.start_rad, circle.sense, half_turn_m, 2 * TURNS)
         xy = circle.centre_m + circle.radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
         turned = np.abs(angles - self.start_rad) / (2.0 * math.pi)
         return np.column_stack([xy, self.start_height_m + self.pitch_m * turned])

@@ -14,6 +14,8 @@ from services.synthesis.config import Config
 
 STEP_M = 0.1
 """Spacing of the path ahead."""
+MAX_STEPS = 4000
+"""A Suggestion holds 4096 points; longer ways ahead get longer steps."""
 
 
 class UnfitError(Exception):

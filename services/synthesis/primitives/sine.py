@@ -15,6 +15,7 @@ import numpy as np
 from common.frames import Array
 from services.synthesis.config import Config
 from services.synthesis.primitives.shape import (
+    MAX_STEPS,
     STEP_M,
     Quality,
     Shape,
@@ -143,7 +144,7 @@ class Sine(Shape):
         dense = np.linspace(0.0, WAVES_AHEAD * self.wavelength_m, 128 * WAVES_AHEAD + 1)
         across = self._across(dense)
         length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(dense), np.diff(across)))])
-        steps = max(round(float(length[-1]) / STEP_M), 32 * WAVES_AHEAD)
+        steps = min(max(round(float(length[-1]) / STEP_M), 32 * WAVES_AHEAD), MAX_STEPS)
         along = np.interp(np.linspace(0.0, length[-1], steps + 1), length, dense)
         across = self._across(along)
         cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)

@@ -88,9 +88,9 @@ class Flight(RuleBasedStateMachine):
 
     @rule(back=st.integers(1, 5))
     def an_old_stick_comes_again(self, back: int) -> None:
-        if self.now_ns - self.stick_ns > 0.2 * S or self.seq <= back:
+        if self.stick is None or self.now_ns - self.stick_ns > 0.2 * S or self.stick.seq < back:
             return
-        old = stick(self.seq - back, vx=1.0)
+        old = stick(self.stick.seq - back, vx=1.0)
         mode = self.autopilot.mode
         self.watch(self.autopilot.on_stick(old, self.now_ns, self.now_ns))
         assert self.autopilot.mode in (mode, "hover", "landed")

@@ -219,6 +219,10 @@ def test_a_fit_of_very_many_points_is_as_good():
     assert ask("arc", points).params["radius"] == pytest.approx(2.0, rel=0.01)
 
 
+def test_the_path_of_a_huge_shape_still_fits_a_suggestion():
+    assert len(ask("sine", sine_points(100.0, 1000.0, 0.3, 0.0, 1.5)).path) <= 4096
+
+
 @pytest.mark.parametrize(
     ("primitive", "points", "field"),
     [

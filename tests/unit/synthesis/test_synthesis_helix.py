@@ -54,3 +54,16 @@ def test_a_level_turn_is_no_helix_but_an_arc():
     with pytest.raises(UnfitError) as unfit:
         Helix.fit(points, points[-1]).check(Config())
     assert unfit.value.simpler == "arc"
+
+
+def test_a_climb_that_hardly_turns_is_no_helix():
+    points = helix_points(0.5, 0.0, 4.0, 10.0)
+    with pytest.raises(UnfitError, match="steep"):
+        Helix.fit(points, points[-1]).check(Config())
+
+
+def test_steps_of_a_wide_helix_fit_a_suggestion():
+    points = helix_points(14.0, 0.0, 2.0, 3.0)
+    ahead = Helix.fit(points, points[-1]).ahead()
+    assert len(ahead) <= 4096
+    assert np.linalg.norm(np.diff(ahead, axis=0), axis=1).max() < 0.11

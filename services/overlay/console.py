@@ -1,0 +1,215 @@
+"""The console's web server: one page, one WebSocket a viewer, on a thread of its own.
+
+A slow or frozen viewer slows nobody: each has its own task, which sends the newest picture only
+after the page has shown the last one. Decisions are asked on worker threads, so that an autopilot
+that does not answer freezes nothing.
+"""
+
+import asyncio
+import contextlib
+import logging
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import msgspec
+from aiohttp import WSMsgType, web
+
+from common.clock import Clock
+from services.overlay import protocol
+from services.overlay.lease import PadLease
+
+PAGE = Path(__file__).parent / "console" / "dist"
+PLAIN_PAGE = Path(__file__).parent / "console" / "plain.html"
+STATE_PERIOD_S = 0.1
+SHOWN_TIMEOUT_S = 1.0
+"""A page that does not say it has shown a picture gets the next one after this."""
+MAX_MESSAGE_BYTES = 4096
+START_TIMEOUT_S = 10.0
+
+Ask = Callable[[protocol.Decided], protocol.Answer]
+
+log = logging.getLogger(__name__)
+
+
+class Viewer:
+    """One page that is connected."""
+
+    def __init__(self, number: int, socket: web.WebSocketResponse) -> None:
+        self.number = number
+        self.socket = socket
+        self.picture: bytes | None = None
+        self.news = asyncio.Event()
+        self.shown = asyncio.Event()
+
+    def offer(self, picture: bytes) -> None:
+        """Have the newest picture sent next."""
+        self.picture = picture
+        self.news.set()
+
+
+class Console:
+    """The server; its public methods may be called from any thread.
+
+    Args:
+        host: address to listen on.
+        port: port to listen on.
+        state_of: what to show, given whether the pad is `free`, `yours` or `busy`.
+        ask: decides; may block.
+        lease: whose sticks count.
+        clock: for the lease.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        state_of: Callable[[str], protocol.State],
+        ask: Ask,
+        lease: PadLease,
+        clock: Clock,
+    ) -> None:
+        self._host = host
+        self._port = port
+        self._state_of = state_of
+        self._ask = ask
+        self._lease = lease
+        self._clock = clock
+        self._viewers: dict[int, Viewer] = {}
+        self._numbers = 0
+        self._asked: set[asyncio.Task[None]] = set()
+        self._loop = asyncio.new_event_loop()
+        self._stop: asyncio.Event | None = None
+        self._started = threading.Event()
+        self._error: OSError | None = None
+        self._workers = ThreadPoolExecutor(max_workers=4, thread_name_prefix="decide")
+        self._thread = threading.Thread(target=self._serve, name="console", daemon=True)
+
+    def start(self) -> None:
+        """Listen.
+
+        Raises:
+            OSError: if the port cannot be listened on.
+        """
+        self._thread.start()
+        self._started.wait(START_TIMEOUT_S)
+        if self._error is not None:
+            raise self._error
+
+    def show(self, picture: bytes) -> None:
+        """Send a picture to every viewer who is ready for one."""
+        if self._viewers:
+            self._loop.call_soon_threadsafe(self._offer, picture)
+
+    def close(self) -> None:
+        """Close every connection and stop listening."""
+        if self._stop is not None and self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._stop.set)
+            self._thread.join(START_TIMEOUT_S)
+        self._workers.shutdown(wait=False, cancel_futures=True)
+
+    # --- on the console's thread -----------------------------------------------------------------
+
+    def _offer(self, picture: bytes) -> None:
+        for viewer in self._viewers.values():
+            viewer.offer(picture)
+
+    def _serve(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_until_complete(self._run())
+        except OSError as error:
+            self._error = error
+        finally:
+            self._started.set()
+            self._loop.close()
+
+    async def _run(self) -> None:
+        self._stop = asyncio.Event()
+        app = web.Application()
+        app.router.add_get("/ws", self._talk)
+        app.router.add_get("/", self._page)
+        if (PAGE / "assets").is_dir():
+            app.router.add_static("/assets", PAGE / "assets")
+        runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.5)
+        await runner.setup()
+        try:
+            await web.TCPSite(runner, self._host, self._port).start()
+            self._started.set()
+            await self._stop.wait()
+            for viewer in tuple(self._viewers.values()):
+                await viewer.socket.close()
+        finally:
+            await runner.cleanup()
+
+    async def _page(self, _request: web.Request) -> web.FileResponse:
+        built = PAGE / "index.html"
+        return web.FileResponse(
+            built if built.is_file() else PLAIN_PAGE, headers={"Cache-Control": "no-cache"}
+        )
+
+    async def _talk(self, request: web.Request) -> web.WebSocketResponse:
+        socket = web.WebSocketResponse(heartbeat=5.0, max_msg_size=MAX_MESSAGE_BYTES)
+        await socket.prepare(request)
+        self._numbers += 1
+        viewer = Viewer(self._numbers, socket)
+        self._viewers[viewer.number] = viewer
+        tasks = [
+            asyncio.create_task(self._send_pictures(viewer)),
+            asyncio.create_task(self._send_state(viewer)),
+        ]
+        try:
+            async for message in socket:
+                if message.type is WSMsgType.TEXT:
+                    await self._hear(viewer, message.data)
+        finally:
+            del self._viewers[viewer.number]
+            self._lease.release(viewer.number, self._clock.monotonic_ns())
+            for task in tasks:
+                task.cancel()
+        return socket
+
+    async def _send_pictures(self, viewer: Viewer) -> None:
+        with contextlib.suppress(ConnectionError):
+            while not viewer.socket.closed:
+                await viewer.news.wait()
+                viewer.news.clear()
+                if viewer.picture is None:
+                    continue
+                viewer.shown.clear()
+                await viewer.socket.send_bytes(viewer.picture)
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(viewer.shown.wait(), SHOWN_TIMEOUT_S)
+
+    async def _send_state(self, viewer: Viewer) -> None:
+        with contextlib.suppress(ConnectionError):
+            while not viewer.socket.closed:
+                holder = self._lease.holder(self._clock.monotonic_ns())
+                pad = {None: "free", viewer.number: "yours"}.get(holder, "busy")
+                await viewer.socket.send_str(protocol.encode(self._state_of(pad)))
+                await asyncio.sleep(STATE_PERIOD_S)
+
+    async def _hear(self, viewer: Viewer, text: str) -> None:
+        try:
+            said = protocol.decode(text)
+        except (msgspec.MsgspecError, RecursionError, UnicodeError) as error:
+            await viewer.socket.send_str(protocol.encode(protocol.Problem(str(error))))
+            return
+        match said:
+            case protocol.Shown():
+                viewer.shown.set()
+            case protocol.StickMoved(vx, vy, vz, wz):
+                self._lease.move(viewer.number, (vx, vy, vz, wz), self._clock.monotonic_ns())
+            case protocol.Released():
+                self._lease.release(viewer.number, self._clock.monotonic_ns())
+            case protocol.Decided():
+                task = asyncio.create_task(self._decide(viewer, said))
+                # The loop keeps only a weak reference to a task.
+                self._asked.add(task)
+                task.add_done_callback(self._asked.discard)
+
+    async def _decide(self, viewer: Viewer, decided: protocol.Decided) -> None:
+        answer = await self._loop.run_in_executor(self._workers, self._ask, decided)
+        with contextlib.suppress(ConnectionError):
+            await viewer.socket.send_str(protocol.encode(answer))

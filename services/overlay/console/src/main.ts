@@ -1,0 +1,44 @@
+import { Connection } from "./connection";
+import { Hands } from "./hands";
+import { Keyboard } from "./keyboard";
+import { Pad } from "./pad";
+import type { Action, State } from "./protocol";
+import { Thumbs } from "./thumbs";
+import { Video } from "./video";
+import { View, element } from "./view";
+
+const view = new View();
+const video = new Video(element<HTMLCanvasElement>("picture"));
+let state: State | null = null;
+
+const connection = new Connection({
+  picture: (data) => void video.show(data).then(() => connection.send({ type: "shown" })),
+  message: (message) => {
+    if (message.type === "state") view.state((state = message));
+    else if (message.type === "decision") view.answer(message);
+    else view.problem(message.error);
+  },
+  link: (up) => view.link(up),
+});
+
+function act(action: Action): void {
+  // One nonce a press: the autopilot answers a repeated one without a second effect.
+  const nonce = crypto.getRandomValues(new Uint32Array(1))[0] ?? 0;
+  const offer = state?.offer;
+  if (action === "accept" && offer) {
+    connection.send({ type: "decide", action, nonce, suggestion: offer.id });
+  } else {
+    connection.send({ type: "decide", action, nonce });
+  }
+}
+
+for (const action of ["accept", "cancel", "takeoff", "land", "emergency"] as const) {
+  element<HTMLButtonElement>(action).addEventListener("click", (event) => {
+    act(action);
+    // Enter and space are keys to fly by, not to press the last button again.
+    (event.currentTarget as HTMLElement).blur();
+  });
+}
+
+const thumbs = new Thumbs(element("left-thumb"), element("right-thumb"));
+new Hands([new Pad(act), new Keyboard(act), thumbs], (message) => connection.send(message));

@@ -1,0 +1,125 @@
+import type { Answer, State } from "./protocol";
+
+const STALE_S: Record<string, number> = {
+  "camera/front": 0.5,
+  pose: 0.2,
+  stick: 0.2,
+  autopilot: 0.5,
+  vehicle: 1,
+};
+
+export function element<E extends HTMLElement>(id: string): E {
+  const found = document.getElementById(id);
+  if (found === null) throw new Error(`the page has no #${id}`);
+  return found as E;
+}
+
+function percent(fraction: number): string {
+  return `${Math.round(100 * fraction)} %`;
+}
+
+/** Everything around the picture. */
+export class View {
+  private readonly bars = new Map<string, HTMLElement>();
+  private answerUntil_ms = 0;
+
+  link(up: boolean): void {
+    document.body.dataset["link"] = up ? "up" : "down";
+    element("link").textContent = up ? "connected" : "no console server";
+  }
+
+  state(state: State): void {
+    document.title = `${state.mode} · Autocomplete`;
+    document.body.dataset["mode"] = state.mode;
+    document.body.dataset["network"] = state.linked ? "up" : "down";
+    if (!state.linked) element("link").textContent = "no router";
+    else element("link").textContent = "connected";
+    element("vehicle").textContent = state.vehicle_name;
+    element("mode").textContent = state.mode;
+    element("reason").textContent = state.reason.replaceAll("_", " ");
+    this.offer(state);
+    this.intent(state);
+    this.facts(state);
+    element("pad").textContent = {
+      free: "free: move a stick to fly",
+      yours: "you fly",
+      busy: "another console flies",
+    }[state.pad];
+    element("services").replaceChildren(
+      ...state.alive.map((name) => Object.assign(document.createElement("li"), { textContent: name })),
+    );
+    const age_s = state.ages_s["camera/front"] ?? null;
+    element("veil").hidden = age_s !== null && age_s < 1;
+    if (performance.now() > this.answerUntil_ms) element("answer").textContent = "";
+  }
+
+  answer(answer: Answer): void {
+    const line = element("answer");
+    line.textContent = `${answer.ok ? "Done" : "Refused"}: ${answer.reason.replaceAll("_", " ")}`;
+    line.dataset["ok"] = String(answer.ok);
+    this.answerUntil_ms = performance.now() + 4000;
+  }
+
+  problem(error: string): void {
+    this.answer({ type: "decision", nonce: 0, ok: false, reason: error });
+  }
+
+  private offer(state: State): void {
+    const { offer } = state;
+    const engaged = state.mode === "engaged";
+    element("offer").dataset["state"] = engaged ? "engaged" : offer ? "offered" : "none";
+    element("offer-shape").textContent = offer ? offer.primitive : "none";
+    element("offer-detail").textContent = engaged
+      ? `${state.progress_m.toFixed(1)} m flown, ${(100 * Math.abs(state.cross_track_m)).toFixed(0)} cm beside it`
+      : offer
+        ? `${percent(offer.confidence)} sure, ${offer.speed_mps.toFixed(1)} m/s, fit ${(100 * offer.fit_rms_m).toFixed(0)} cm`
+        : "Fly a shape for two seconds.";
+    element<HTMLButtonElement>("accept").disabled = offer === null || engaged;
+  }
+
+  private intent(state: State): void {
+    for (const [name, probability] of Object.entries(state.probabilities)) {
+      let bar = this.bars.get(name);
+      if (bar === undefined) {
+        bar = document.createElement("div");
+        bar.className = "bar";
+        bar.append(
+          Object.assign(document.createElement("span"), { textContent: name }),
+          document.createElement("meter"),
+        );
+        this.bars.set(name, bar);
+        element("intent").append(bar);
+      }
+      bar.dataset["chosen"] = String(name === state.label);
+      const meter = bar.querySelector("meter");
+      if (meter !== null) meter.value = probability;
+    }
+    element("intent").dataset["label"] = state.label;
+  }
+
+  private facts(state: State): void {
+    const facts: [string, string, boolean][] = [
+      ["state", state.vehicle_state.replaceAll("_", " "), false],
+      ["world", state.world || "unknown", false],
+      [
+        "battery",
+        state.battery === null ? "unknown" : percent(state.battery),
+        state.battery !== null && state.battery < 0.2,
+      ],
+      ["collisions", String(state.collisions), state.collisions > 0],
+      ["pose", state.pose_status, state.pose_status !== "ok"],
+    ];
+    for (const [topic, limit_s] of Object.entries(STALE_S)) {
+      const age_s = state.ages_s[topic] ?? null;
+      const text = age_s === null ? "never" : `${Math.round(1000 * age_s)} ms ago`;
+      facts.push([topic, text, age_s === null || age_s > limit_s]);
+    }
+    element("facts").replaceChildren(
+      ...facts.flatMap(([name, text, isBad]) => {
+        const value = Object.assign(document.createElement("dd"), { textContent: text });
+        value.classList.toggle("bad", isBad);
+        return [Object.assign(document.createElement("dt"), { textContent: name }), value];
+      }),
+    );
+  }
+}

@@ -1,0 +1,61 @@
+"""Draws arrows and a line of text into a picture (BGR, in place). Pure."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from services.overlay.arrows import Arrow
+
+Picture = NDArray[np.uint8]
+Colour = tuple[int, int, int]
+
+SUGGESTED: Colour = (40, 190, 255)
+ENGAGED: Colour = (110, 220, 70)
+WARNING: Colour = (70, 90, 255)
+TEXT: Colour = (245, 245, 245)
+EDGE: Colour = (20, 20, 20)
+
+STRIP_PX = 24
+_SUBPIXEL_BITS = 4
+
+
+def draw_arrow(picture: Picture, arrow: Arrow, colour: Colour) -> None:
+    """Blend one arrow into the picture with its opacity."""
+    height, width = picture.shape[:2]
+    low = np.floor(arrow.outline_px.min(axis=0)).astype(int) - 2
+    high = np.ceil(arrow.outline_px.max(axis=0)).astype(int) + 3
+    x0, y0 = max(0, int(low[0])), max(0, int(low[1]))
+    x1, y1 = min(width, int(high[0])), min(height, int(high[1]))
+    if x0 >= x1 or y0 >= y1:
+        return
+    region = picture[y0:y1, x0:x1]
+    painted = region.copy()
+    outline = np.round((arrow.outline_px - (x0, y0)) * (1 << _SUBPIXEL_BITS)).astype(np.int32)
+    cv2.fillPoly(painted, [outline], colour, cv2.LINE_AA, _SUBPIXEL_BITS)
+    cv2.polylines(painted, [outline], True, EDGE, 1, cv2.LINE_AA, _SUBPIXEL_BITS)
+    cv2.addWeighted(painted, arrow.opacity, region, 1.0 - arrow.opacity, 0.0, region)
+
+
+def draw_strip(picture: Picture, parts: list[tuple[str, Colour]]) -> None:
+    """Write texts side by side on a darkened strip at the picture's top."""
+    strip = picture[:STRIP_PX]
+    cv2.addWeighted(strip, 0.35, strip, 0.0, 0.0, strip)
+    x = 8
+    for text, colour in parts:
+        cv2.putText(picture, text, (x, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, 1, cv2.LINE_AA)
+        (text_width, _), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.42, 1)
+        x += text_width + 18
+
+
+def decode(data: bytes) -> Picture | None:
+    """A JPEG as BGR, or None if it is none."""
+    if not data:
+        return None
+    decoded = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
+    return None if decoded is None else np.asarray(decoded, dtype=np.uint8)
+
+
+def encode(picture: Picture, quality: int) -> bytes:
+    """A BGR picture as JPEG."""
+    _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return bytes(data.tobytes())

@@ -1,0 +1,115 @@
+"""What the console's page and its server say to one another, over one WebSocket.
+
+From the server: binary messages are JPEG pictures; text messages are JSON maps with a `type`. The
+page answers each picture with `shown`, and gets the newest picture only then: a slow page sees
+fewer pictures and never old ones.
+"""
+
+import math
+
+import msgspec
+
+from common.messages import Confidence, Count, DecideAction, Fraction
+
+
+class ClientMessage(msgspec.Struct, frozen=True, tag_field="type", forbid_unknown_fields=True):
+    """What a page sends."""
+
+    def __post_init__(self) -> None:
+        for field in self.__struct_fields__:
+            value = getattr(self, field)
+            if isinstance(value, float) and not math.isfinite(value):
+                raise ValueError(f"{field} is not finite")
+
+
+class StickMoved(ClientMessage, frozen=True, tag="stick"):
+    """The page's sticks; sent at about 50 Hz while they are held."""
+
+    vx: Fraction
+    vy: Fraction
+    vz: Fraction
+    wz: Fraction
+
+
+class Released(ClientMessage, frozen=True, tag="release"):
+    """The page's sticks were let go."""
+
+
+class Decided(ClientMessage, frozen=True, tag="decide"):
+    """A button was pressed."""
+
+    action: DecideAction
+    nonce: int
+    suggestion: Count | None = None
+
+
+class Shown(ClientMessage, frozen=True, tag="shown"):
+    """The last picture is on the screen."""
+
+
+FromPage = StickMoved | Released | Decided | Shown
+
+
+class Answer(msgspec.Struct, frozen=True, tag_field="type", tag="decision"):
+    """What became of a decision."""
+
+    nonce: int
+    ok: bool
+    reason: str
+
+
+class Problem(msgspec.Struct, frozen=True, tag_field="type", tag="error"):
+    """What the page sent cannot be used."""
+
+    error: str
+
+
+class Offer(msgspec.Struct, frozen=True):
+    """The suggestion on the screen."""
+
+    id: Count
+    primitive: str
+    confidence: Confidence
+    speed_mps: float
+    fit_rms_m: float
+
+
+class State(msgspec.Struct, frozen=True, tag_field="type", tag="state"):
+    """What the page shows around the picture; ages in s, None for what never came."""
+
+    vehicle_name: str
+    mode: str
+    reason: str
+    progress_m: float
+    cross_track_m: float
+    offer: Offer | None
+    label: str
+    probabilities: dict[str, float]
+    vehicle_state: str
+    battery: float | None
+    collisions: int
+    world: str
+    pose_status: str
+    ages_s: dict[str, float | None]
+    alive: list[str]
+    linked: bool
+    pad: str
+    """`free`, `yours` or `busy`."""
+
+
+_decoder: msgspec.json.Decoder[FromPage] = msgspec.json.Decoder(FromPage)
+_encoder = msgspec.json.Encoder()
+
+
+def decode(text: str) -> FromPage:
+    """What a page said.
+
+    Raises:
+        msgspec.MsgspecError: if it is nothing that a page may say.
+    """
+    return _decoder.decode(text)
+
+
+def encode(message: Answer | Problem | State) -> str:
+    """A message to a page, as JSON."""
+    return _encoder.encode(message).decode()

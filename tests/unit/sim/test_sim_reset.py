@@ -1,0 +1,73 @@
+"""`reset` starts anew in place, or says what is allowed and changes nothing."""
+
+import pytest
+from flights import fly, hovering
+
+from common.messages import ResetRequest
+from services.sim.config import Config
+from services.sim.core import ResetError, Simulation
+from services.sim.plant import Sticks
+
+
+def test_another_world_brings_its_own_start() -> None:
+    simulation = hovering()
+    status = simulation.reset(ResetRequest(world="track"))
+    assert (status.world, status.state, status.collisions) == ("track", "landed", 0)
+    assert simulation.state.position_m == pytest.approx((0.0, 0.0, 0.055))
+
+
+def test_what_is_left_out_stays_as_it_was_set() -> None:
+    simulation = hovering()
+    simulation.reset(ResetRequest(position=(2.0, 1.0, 1.5), yaw=0.5))
+    fly(simulation, 1.0, Sticks(vx=1.0))
+    status = simulation.reset(ResetRequest())
+    assert status.state == "flying"
+    assert simulation.state.position_m == pytest.approx((2.0, 1.0, 1.5))
+    assert simulation.state.yaw_rad == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("request_", "field", "allowed"),
+    [
+        (ResetRequest(world="nowhere"), "world", "track"),
+        (ResetRequest(plant="ardrone"), "plant", "tum"),
+        (ResetRequest(position=(0.0, 0.0, -1.0)), "position", "0..100 m"),
+        (ResetRequest(position=(1e6, 0.0, 1.0)), "position", "1000 m"),
+        (ResetRequest(position=(4.5, 4.2, 0.5)), "position", "free"),
+    ],
+)
+def test_a_bad_request_is_refused_and_the_flight_goes_on(
+    request_: ResetRequest, field: str, allowed: str
+) -> None:
+    simulation = hovering(world="track")
+    fly(simulation, 0.5, Sticks(vx=0.5))
+    before = simulation.state
+    with pytest.raises(ResetError, match=allowed) as caught:
+        simulation.reset(request_)
+    assert caught.value.field == field
+    assert simulation.state == before
+    assert simulation.status().state == "flying"
+    fly(simulation, 0.5, Sticks(vx=0.5))
+    assert simulation.state.velocity_mps[0] == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"plant": "ardrone"},
+        {"world": "nowhere"},
+        {"seed": -1},
+        {"sensor_noise": -0.1},
+        {"front_fps": 0.0},
+        {"down_width": 5},
+        {"front_view_deg": 180.0},
+        {"jpeg_quality": 0},
+    ],
+)
+def test_a_bad_configuration_is_refused_with_its_field(settings: dict[str, object]) -> None:
+    with pytest.raises(ValueError, match=next(iter(settings))):
+        Config(**settings)
+
+
+def test_it_starts_where_the_world_says() -> None:
+    assert Simulation(Config()).state.position_m == pytest.approx((0.0, 0.0, 0.055))

@@ -1,0 +1,82 @@
+"""Instruments agree with the motion, and their noise is what is stated."""
+
+import numpy as np
+import pytest
+from flights import fly, hovering
+from scipy.spatial.transform import Rotation
+
+from common.messages import Imu, Pose, Range, ResetRequest
+from services.sim.plant import GRAVITY_MPS2, Sticks
+from services.sim.sensors import ACCELERATION_NOISE_MPS2, MAGNETIC_FIELD, RATE_NOISE_RADPS
+
+
+def test_integrating_the_imu_gives_the_velocity() -> None:
+    simulation = hovering()
+    _, messages = fly(simulation, 3.0, lambda t: Sticks(vx=0.8, vy=0.4 * (t > 1.0), wz=0.6))
+    poses = {m.stamp: m for _, m in messages if isinstance(m, Pose)}
+    velocity = np.zeros(3)
+    turn = None
+    for imu in (m for _, m in messages if isinstance(m, Imu)):
+        if imu.stamp in poses:
+            turn = Rotation.from_quat(poses[imu.stamp].orientation)
+        elif turn is not None:
+            turn = turn * Rotation.from_rotvec(np.multiply(imu.angular_velocity, 0.005))
+        if turn is not None:
+            force = turn.apply(imu.linear_acceleration)
+            velocity += 0.005 * (force - (0.0, 0.0, GRAVITY_MPS2))
+    assert np.allclose(velocity, simulation.state.velocity_mps, atol=0.02)
+
+
+def test_at_rest_the_specific_force_points_up_and_noise_is_as_stated() -> None:
+    simulation = hovering(sensor_noise=1.0)
+    simulation.reset(ResetRequest(position=(0.0, 0.0, 0.0)))
+    fly(simulation, 0.5, silent=True)
+    _, messages = fly(simulation, 5.0, silent=True)
+    imus = [m for _, m in messages if isinstance(m, Imu)]
+    force = np.asarray([m.linear_acceleration for m in imus])
+    rates = np.asarray([m.angular_velocity for m in imus])
+    field = np.asarray([m.magnetic_field for m in imus])
+    assert force.mean(axis=0) == pytest.approx((0.0, 0.0, GRAVITY_MPS2), abs=0.06)
+    assert force.std(axis=0) == pytest.approx(ACCELERATION_NOISE_MPS2, rel=0.1)
+    assert rates.std(axis=0) == pytest.approx([RATE_NOISE_RADPS] * 3, rel=0.1)
+    assert field.mean(axis=0) == pytest.approx(MAGNETIC_FIELD, abs=0.005)
+
+
+def test_the_magnetometer_turns_with_the_body() -> None:
+    simulation = hovering()
+    simulation.reset(ResetRequest(position=(0.0, 0.0, 1.0), yaw=np.pi / 2.0))
+    _, messages = fly(simulation, 0.1)
+    field = next(m for _, m in messages if isinstance(m, Imu)).magnetic_field
+    # Facing north, the field is ahead and down.
+    assert field == pytest.approx((0.5, 0.0, -0.866), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("position", "expected_m"),
+    [
+        ((0.0, 0.0, 1.0), 1.0),
+        ((0.0, 0.0, 2.5), 2.5),
+        ((0.0, 0.0, 3.5), 3.0),
+        # Over a crate 1.2 m high.
+        ((11.2, 3.6, 2.0), 0.8),
+    ],
+)
+def test_the_altimeter_measures_to_what_is_below(
+    position: tuple[float, float, float], expected_m: float
+) -> None:
+    simulation = hovering(world="track")
+    simulation.reset(ResetRequest(position=position))
+    _, messages = fly(simulation, 0.2)
+    ranges = [m for _, m in messages if isinstance(m, Range)]
+    assert [m.range for m in ranges] == pytest.approx([expected_m] * len(ranges), abs=0.005)
+    assert (ranges[0].min, ranges[0].max) == (0.01, 3.0)
+
+
+def test_truth_is_the_motion_itself() -> None:
+    simulation = hovering(sensor_noise=1.0)
+    states, messages = fly(simulation, 1.0, Sticks(vx=0.5, wz=0.5))
+    pose = [m for _, m in messages if isinstance(m, Pose)][-1]
+    assert pose.position == states[-1].position_m
+    assert pose.velocity == states[-1].velocity_mps
+    assert pose.angular_velocity[2] == pytest.approx(states[-1].angular_velocity_radps[2], rel=0.01)
+    assert pose.source == "truth"
