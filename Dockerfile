@@ -93,7 +93,6 @@ RUN deploy/install --extra overlay
 COPY . .
 COPY --from=console /console/dist services/overlay/console/dist
 RUN deploy/install --source
-ENV AUTOCOMPLETE_OVERLAY_HOST=0.0.0.0
 EXPOSE 8080
 USER autocomplete
 HEALTHCHECK --interval=30s --timeout=10s --start-period=60s CMD ["nice", "autocomplete", "alive", "overlay"]

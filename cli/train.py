@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -101,12 +102,13 @@ def _run(options: argparse.Namespace) -> int:
 def _report(console: Console, run: "Run") -> None:
     whole = run.judged[0].whole
     table = Table(
+        box=SIMPLE,
         title=f"{whole.count} primitives of {whole.operators} operators held out",
         caption="F1 is weighted by class: at the end with its 95 % interval over operators,"
         " and so many seconds after the beginning. ECE: expected calibration error.",
     )
     for heading in ("classifier", "accuracy", "F1", "interval"):
-        table.add_column(heading)
+        table.add_column(heading, no_wrap=True)
     for after, _ in run.judged[0].early:
         table.add_column(f"{after:g} s")
     table.add_column("ECE")
@@ -116,7 +118,7 @@ def _report(console: Console, run: "Run") -> None:
             judged.name,
             f"{judged.whole.accuracy:.3f}",
             f"{judged.whole.f1:.3f}",
-            f"{judged.whole.interval[0]:.3f}-{judged.whole.interval[1]:.3f}",
+            f"{judged.whole.interval[0]:.2f}-{judged.whole.interval[1]:.2f}",
             *(f"{s.f1:.3f}" for _, s in judged.early),
             error,
         )
@@ -129,7 +131,7 @@ def _report(console: Console, run: "Run") -> None:
 def _confusion(judged: "Judged") -> Table:
     from training.generator.shapes import LABELS
 
-    table = Table(title=f"{judged.name}: was (rows), said (columns)")
+    table = Table(box=SIMPLE, title=f"{judged.name}: was (rows), said (columns)")
     table.add_column("")
     for label in LABELS:
         table.add_column(label, justify="right")

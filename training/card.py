@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from training.generator.dataset import counts_of
 from training.generator.operators import FAMILIES
 from training.generator.shapes import LABELS
 
@@ -42,8 +43,8 @@ def card_of(run: "Run") -> str:
     return f"""# intent.onnx
 
 Which primitive do the sticks draw: {", ".join(LABELS)}?
-Written by `autocomplete train --preset {run.preset_name} --seed {run.seed}`; figures in
-intent.json.
+Written by `autocomplete train --preset {run.preset_name} --seed {run.seed}`; its figures for
+programs are in intent.json, how it works is in docs/model.md.
 
 - SHA-256: `{run.sha256}`
 - Input: `sticks` (batch, time, 3) float32: vx, vy, vz as fractions of full stick at 50 Hz, in
@@ -54,10 +55,15 @@ intent.json.
 ## Data
 
 Sticks of simulated operators only (training/generator): {len(FAMILIES)} families of hands and
-pilots.
-Training {preset.operators} operators, {preset.multiple:g} times the thesis' 2399 primitives;
-validation {preset.validation_operators} others; test {whole.count} primitives of
-{preset.test_operators} others again. {epochs} epochs; temperature {run.fitted.temperature:.2f}.
+pilots, and three sets of people that share nobody.
+
+| set | operators | primitives |
+|---|---|---|
+| training | {preset.operators} | {sum(counts_of(preset.multiple).values())} |
+| validation | {preset.validation_operators} | {sum(counts_of(preset.validation_multiple).values())} |
+| test | {preset.test_operators} | {whole.count} |
+
+Classes are as frequent as in the thesis. {epochs} epochs, temperature {run.fitted.temperature:.2f}.
 Windows over 200 samples keep the newest 200.
 
 ## Figures on operators held out
@@ -70,8 +76,8 @@ ECE is the expected calibration error at the end of the primitive, in 15 bins.
 |{"---|" * (5 + len(first.early))}
 {chr(10).join(_row(judged) for judged in run.judged)}
 
-The SVM has C = 100, gamma = 0.001, 100 roll and 100 pitch samples, standardised, and is trained
-on as many primitives as the thesis has.
+The SVM has C = 100, gamma = 0.001, 100 roll and 100 pitch samples, standardised. It is trained on
+whole primitives, as many as the thesis has. It does not see vz, so it cannot tell a helix.
 
 {first.name}:
 

@@ -12,7 +12,7 @@ from services.classifier.model import OnnxModel
 from training.card import card_of
 from training.export import export
 from training.fit import Epoch, Fitted, fit
-from training.generator.dataset import THESIS_COUNTS, Primitive, generate
+from training.generator.dataset import THESIS_COUNTS, Primitive, counts_of, generate
 from training.generator.shapes import LABELS
 from training.scores import Score, calibration_error, score
 from training.svm import features, fit_svm
@@ -103,15 +103,10 @@ class Run:
     parity: float
 
 
-def counts(multiple: float) -> dict[str, int]:
-    """The thesis' counts by label, times `multiple`."""
-    return {label: max(1, round(count * multiple)) for label, count in THESIS_COUNTS.items()}
-
-
 def _set(
     name: str, operators: int, multiple: float, seed: int, progress: Progress
 ) -> list[Primitive]:
-    wanted = counts(multiple)
+    wanted = counts_of(multiple)
     total, done = sum(wanted.values()), 0
 
     def advance(more: int) -> None:
@@ -220,7 +215,7 @@ def train(preset_name: str, seed: int, out: Path, progress: Progress) -> Run:
         judged=(
             judge("CNN-GRU", lambda w: _batched(model, w), test, families, True),
             judge(
-                "SVM of the thesis",
+                "SVM (thesis)",
                 lambda w: machine.decision_function(features(w)),
                 test,
                 families,

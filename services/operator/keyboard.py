@@ -25,22 +25,22 @@ AXES: dict[str, tuple[int, int]] = {
 
 DECISIONS: dict[str, DecideAction] = {
     "return": "accept",
-    "backspace": "cancel",
+    "escape": "cancel",
     "t": "takeoff",
     "l": "land",
-    "escape": "emergency",
+    "delete": "emergency",
 }
 
-FULL = 0.85
+FULL = 0.8
 """What a held key commands in the end."""
 RISE_PER_S = 4.0
 """A key is pressed at once, a stick is not: the deflection grows at this rate."""
 
 HELP = (
-    "W S A D    forward back left right",
-    "arrows     up down, turn left right",
-    "Enter      accept     Backspace  cancel",
-    "T take off   L land   Esc  emergency",
+    "W S A D   forward back left right",
+    "arrows   up down, turn left right",
+    "Enter accept    Esc cancel",
+    "T take off   L land   Del emergency",
 )
 NO_SCREEN = {"dummy", "offscreen"}
 

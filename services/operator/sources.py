@@ -55,14 +55,18 @@ class _Gate:
     """Lets sticks through once they have been neutral since they were last lost."""
 
     def __init__(self) -> None:
-        self._open = False
+        self._is_open = False
+
+    def open(self) -> None:
+        """Nobody holds the sticks, though none was heard to be neutral."""
+        self._is_open = True
 
     def pass_on(self, sticks: Deflection | None) -> Deflection:
         if sticks is None:
-            self._open = False
+            self._is_open = False
         elif sticks.is_neutral:
-            self._open = True
-        return sticks if sticks is not None and self._open else NEUTRAL
+            self._is_open = True
+        return sticks if sticks is not None and self._is_open else NEUTRAL
 
 
 class Sources:
@@ -71,16 +75,19 @@ class Sources:
     def __init__(self) -> None:
         self._own_gate = _Gate()
         self._console_gate = _Gate()
-        self._console: Stick | None = None
-        self._console_arrival_ns = 0
+        self._console: Deflection | None = None
+        self._console_buttons: tuple[str, ...] = ()
+        self._console_ns: int | None = None
+        self._begin_ns: int | None = None
         self._held: frozenset[DecideAction] = frozenset()
 
     def console_stick(self, stick: Stick, arrival_ns: int) -> None:
-        """Take the browser's newest stick."""
-        self._console = stick
-        self._console_arrival_ns = arrival_ns
+        """Take the browser's newest stick. It sends while sticks are held, then one neutral."""
+        self._console = Deflection(stick.vx, stick.vy, stick.vz, stick.wz)
+        self._console_buttons = tuple(stick.buttons or ())
+        self._console_ns = arrival_ns
         # A neutral one may be followed by a deflected one before the next step.
-        self._console_gate.pass_on(_deflection_of(stick))
+        self._console_gate.pass_on(self._console)
 
     def step(self, now_ns: int, own: Reading | None) -> Output:
         """What to send now; `own` is the device's reading, None while there is no device."""
@@ -88,14 +95,22 @@ class Sources:
         pressed = tuple(sorted(held - self._held))
         self._held = held
         mine = self._own_gate.pass_on(own.sticks if own is not None else None)
-        stick = self._console
-        if stick is not None and now_ns - self._console_arrival_ns > CONSOLE_MAX_AGE_NS:
-            stick = self._console = None
-        theirs = self._console_gate.pass_on(_deflection_of(stick) if stick is not None else None)
+        theirs = self._console_sticks(now_ns)
         if not theirs.is_neutral:
-            return Output(theirs, tuple(stick.buttons or ()) if stick else (), pressed, True)
+            return Output(theirs, self._console_buttons, pressed, True)
         return Output(mine, own.buttons if own is not None else (), pressed)
 
-
-def _deflection_of(stick: Stick) -> Deflection:
-    return Deflection(stick.vx, stick.vy, stick.vz, stick.wz)
+    def _console_sticks(self, now_ns: int) -> Deflection:
+        if self._begin_ns is None:
+            self._begin_ns = now_ns
+        heard_ns = self._begin_ns if self._console_ns is None else self._console_ns
+        if now_ns - heard_ns <= CONSOLE_MAX_AGE_NS:
+            return self._console_gate.pass_on(self._console) if self._console else NEUTRAL
+        if self._console_ns is None:
+            # Silent since the start: a console whose sticks are held would have been heard.
+            self._console_gate.open()
+        elif self._console is not None and not self._console.is_neutral:
+            # Lost while held. Silence after a neutral one is no loss.
+            self._console_gate.pass_on(None)
+        self._console = None
+        return NEUTRAL

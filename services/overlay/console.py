@@ -12,13 +12,14 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import msgspec
 from aiohttp import WSMsgType, web
 
 from common.clock import Clock
 from services.overlay import protocol
-from services.overlay.lease import PadLease
+from services.overlay.lease import PadLease, Standing
 
 PAGE = Path(__file__).parent / "console" / "dist"
 PLAIN_PAGE = Path(__file__).parent / "console" / "plain.html"
@@ -55,7 +56,7 @@ class Console:
     Args:
         host: address to listen on.
         port: port to listen on.
-        state_of: what to show, given whether the pad is `free`, `yours` or `busy`.
+        state_of: what to show, given what the pad is to that page.
         ask: decides; may block.
         lease: whose sticks count.
         clock: for the lease.
@@ -65,7 +66,7 @@ class Console:
         self,
         host: str,
         port: int,
-        state_of: Callable[[str], protocol.State],
+        state_of: Callable[[Standing], protocol.State],
         ask: Ask,
         lease: PadLease,
         clock: Clock,
@@ -116,20 +117,21 @@ class Console:
             viewer.offer(picture)
 
     def _serve(self) -> None:
-        asyncio.set_event_loop(self._loop)
         try:
-            self._loop.run_until_complete(self._run())
+            # A runner also ends the decisions that still wait for their answers.
+            with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+                runner.run(self._run())
         except OSError as error:
             self._error = error
         finally:
             self._started.set()
-            self._loop.close()
 
     async def _run(self) -> None:
         self._stop = asyncio.Event()
         app = web.Application()
         app.router.add_get("/ws", self._talk)
         app.router.add_get("/", self._page)
+        app.router.add_get("/plain", self._plain_page)
         if (PAGE / "assets").is_dir():
             app.router.add_static("/assets", PAGE / "assets")
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.5)
@@ -143,13 +145,18 @@ class Console:
         finally:
             await runner.cleanup()
 
-    async def _page(self, _request: web.Request) -> web.FileResponse:
+    async def _page(self, request: web.Request) -> web.FileResponse:
         built = PAGE / "index.html"
-        return web.FileResponse(
-            built if built.is_file() else PLAIN_PAGE, headers={"Cache-Control": "no-cache"}
-        )
+        return _file(built) if built.is_file() else await self._plain_page(request)
+
+    async def _plain_page(self, _request: web.Request) -> web.FileResponse:
+        return _file(PLAIN_PAGE)
 
     async def _talk(self, request: web.Request) -> web.WebSocketResponse:
+        # Browsers let any site open a socket to any address; only our own pages may fly.
+        origin = request.headers.get("Origin")
+        if origin is not None and urlsplit(origin).netloc != request.host:
+            raise web.HTTPForbidden(text="this socket is for the console's own page")
         socket = web.WebSocketResponse(heartbeat=5.0, max_msg_size=MAX_MESSAGE_BYTES)
         await socket.prepare(request)
         self._numbers += 1
@@ -165,7 +172,7 @@ class Console:
                     await self._hear(viewer, message.data)
         finally:
             del self._viewers[viewer.number]
-            self._lease.release(viewer.number, self._clock.monotonic_ns())
+            self._lease.leave(viewer.number, self._clock.monotonic_ns())
             for task in tasks:
                 task.cancel()
         return socket
@@ -185,9 +192,8 @@ class Console:
     async def _send_state(self, viewer: Viewer) -> None:
         with contextlib.suppress(ConnectionError):
             while not viewer.socket.closed:
-                holder = self._lease.holder(self._clock.monotonic_ns())
-                pad = {None: "free", viewer.number: "yours"}.get(holder, "busy")
-                await viewer.socket.send_str(protocol.encode(self._state_of(pad)))
+                standing = self._lease.standing(viewer.number, self._clock.monotonic_ns())
+                await viewer.socket.send_str(protocol.encode(self._state_of(standing)))
                 await asyncio.sleep(STATE_PERIOD_S)
 
     async def _hear(self, viewer: Viewer, text: str) -> None:
@@ -213,3 +219,7 @@ class Console:
         answer = await self._loop.run_in_executor(self._workers, self._ask, decided)
         with contextlib.suppress(ConnectionError):
             await viewer.socket.send_str(protocol.encode(answer))
+
+
+def _file(path: Path) -> web.FileResponse:
+    return web.FileResponse(path, headers={"Cache-Control": "no-cache"})

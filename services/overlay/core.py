@@ -17,6 +17,9 @@ POSES = 100
 MATCH_S = 0.1
 """A pose whose stamp is this far from the picture's moment does not belong to it."""
 
+OFFERS = 16
+"""Suggestions kept: an accepted one may be seconds older than the newest."""
+
 SECTORS = ("ahead", "ahead left", "left", "back left", "back", "back right", "right", "ahead right")
 
 
@@ -30,14 +33,15 @@ class Overlay:
         self.status: m.AutopilotStatus | None = None
         self.vehicle: m.VehicleStatus | None = None
         self.intent: m.Intent | None = None
-        self.suggestion: m.Suggestion | None = None
+        self._offers: deque[m.Suggestion] = deque(maxlen=OFFERS)
         self._engaged: m.Suggestion | None = None
         self.undecodable = 0
 
     def on_pose(self, pose: m.Pose, now_ns: int) -> None:
         """Remember a pose; one that goes back in time begins anew."""
         if self._poses and pose.stamp < self._poses[-1].stamp:
-            self._poses.clear()
+            # The console's thread may be looking at the old ones.
+            self._poses = deque(maxlen=POSES)
         self._poses.append(pose)
         self._arrival_ns["pose"] = now_ns
 
@@ -52,17 +56,18 @@ class Overlay:
 
     def on_suggestion(self, suggestion: m.Suggestion, now_ns: int) -> None:
         """Remember what can be accepted."""
-        self.suggestion = suggestion
+        self._offers.append(suggestion)
         self._arrival_ns["suggestion"] = now_ns
 
     def on_autopilot(self, status: m.AutopilotStatus, now_ns: int) -> None:
         """Remember who flies, and the suggestion that is being flown."""
         self.status = status
         self._arrival_ns["autopilot"] = now_ns
-        if status.mode != "engaged":
-            self._engaged = None
-        elif self.suggestion is not None and self.suggestion.id == status.suggestion:
-            self._engaged = self.suggestion
+        flown = status.suggestion if status.mode == "engaged" else 0
+        if self._engaged is None or self._engaged.id != flown:
+            # The newest of an id: a synthesis that was restarted counts from 1 again.
+            same = (each for each in reversed(self._offers) if each.id == flown)
+            self._engaged = next(same, None)
 
     def on_vehicle(self, vehicle: m.VehicleStatus, now_ns: int) -> None:
         """Remember the vehicle's state."""
@@ -79,22 +84,24 @@ class Overlay:
         age_s = self.age_s(topic, now_ns)
         return age_s is not None and age_s <= TOPICS[topic].max_age_s
 
-    @property
-    def is_engaged(self) -> bool:
+    def is_engaged(self, now_ns: int) -> bool:
         """Whether the autopilot flies a path."""
-        return self.status is not None and self.status.mode == "engaged"
+        if self.status is None or not self.is_fresh("autopilot", now_ns):
+            return False
+        return self.status.mode == "engaged"
 
     def shown(self, now_ns: int) -> m.Suggestion | None:
         """The suggestion to draw: the one being flown, else one that can still be accepted."""
-        if self.is_engaged:
+        if self.is_engaged(now_ns):
             return self._engaged
-        return self.suggestion if self.is_fresh("suggestion", now_ns) else None
+        return self._offers[-1] if self.is_fresh("suggestion", now_ns) else None
 
     def pose_status(self, now_ns: int) -> str:
         """`ok`, `degraded` or `lost`."""
-        if not self._poses or not self.is_fresh("pose", now_ns):
+        poses = self._poses
+        if not poses or not self.is_fresh("pose", now_ns):
             return "lost"
-        return self._poses[-1].status
+        return poses[-1].status
 
     def draw(self, image: m.Image, now_ns: int) -> m.Image | None:
         """The picture with arrows and a strip of text; None if it is no picture."""
@@ -107,7 +114,7 @@ class Overlay:
         pose = self._pose_at(image.capture, now_ns)
         if suggestion is not None and pose is not None:
             lens = Lens(image.width, image.height, image.intrinsics, image.distortion)
-            colour = pic.ENGAGED if self.is_engaged else pic.SUGGESTED
+            colour = pic.ENGAGED if self.is_engaged(now_ns) else pic.SUGGESTED
             config = self._config
             for arrow in arrows_of(suggestion, pose, lens, config.drawn_m, config.below_m):
                 pic.draw_arrow(picture, arrow, colour)
@@ -141,16 +148,17 @@ class Overlay:
         self, suggestion: m.Suggestion | None, pose: m.Pose | None, now_ns: int
     ) -> list[tuple[str, pic.Colour]]:
         texts: list[tuple[str, pic.Colour]] = []
+        engaged = self.is_engaged(now_ns)
         if self.status is None or not self.is_fresh("autopilot", now_ns):
             texts.append(("NO AUTOPILOT", pic.WARNING))
         else:
-            colour = pic.ENGAGED if self.is_engaged else pic.TEXT
+            colour = pic.ENGAGED if engaged else pic.TEXT
             texts.append((self.status.mode.upper(), colour))
         if suggestion is not None:
             text = f"{suggestion.primitive} {suggestion.confidence:.0%}"
             if suggestion.primitive == "line":
                 text += f" {SECTORS[suggestion.heading_sector]}"
-            texts.append((text, pic.ENGAGED if self.is_engaged else pic.SUGGESTED))
+            texts.append((text, pic.ENGAGED if engaged else pic.SUGGESTED))
         if pose is None:
             texts.append(("POSE LOST", pic.WARNING))
         elif pose.status == "degraded":
@@ -159,6 +167,9 @@ class Overlay:
             low = self.vehicle.battery < 0.2
             battery = f"battery {self.vehicle.battery:.0%}"
             texts.append((battery, pic.WARNING if low else pic.TEXT))
-        if not self.is_fresh("stick", now_ns):
+        stick_age_s = self.age_s("stick", now_ns)
+        if stick_age_s is None or not self.is_fresh("stick", now_ns):
             texts.append(("NO STICKS", pic.WARNING))
+        else:
+            texts.append((f"sticks {1000 * stick_age_s:.0f} ms", pic.TEXT))
         return texts

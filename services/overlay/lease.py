@@ -1,53 +1,94 @@
-"""One pair of hands at a time: the page that moves its sticks first holds the pad. Pure."""
+"""One pair of hands at a time: the page that moves its sticks first holds the pad. Pure.
 
-from common.clock import NS_PER_S
+A page's sticks count once it has said that they are released: when it came, and again after a gap,
+so that sticks still held when a link returns do nothing until they went through neutral.
+"""
 
-STICK_MAX_AGE_S = 0.2
-"""A stick older than this is worthless."""
-HOLD_S = 1.0
+import threading
+from typing import Literal
+
+from common.clock import nanoseconds
+from common.topics import TOPICS
+
+STICK_MAX_AGE_NS = nanoseconds(TOPICS["console/stick"].max_age_s)
+HOLD_NS = nanoseconds(1.0)
 """The pad is free this long after its holder let go."""
 
 Sticks = tuple[float, float, float, float]
 NEUTRAL: Sticks = (0.0, 0.0, 0.0, 0.0)
 
+Standing = Literal["free", "yours", "busy", "stale"]
+"""What the pad is to one page; `stale`: its sticks stopped coming and must be released first."""
+
 
 class PadLease:
-    """Whose sticks count, and what they are now."""
+    """Whose sticks count, and what they are now.
+
+    Pages speak on the console's thread and sticks are sent from the service's, hence the lock.
+    """
 
     def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._centred: set[int] = set()
+        self._stale: set[int] = set()
         self._holder: int | None = None
         self._sticks = NEUTRAL
         self._heard_ns = 0
-        self._released = True
+        self._held = False
         self._neutral_owed = False
 
     def move(self, client: int, sticks: Sticks, now_ns: int) -> bool:
-        """Take a page's sticks; False if another page holds the pad."""
-        if self.holder(now_ns) not in (None, client):
-            return False
-        self._holder, self._sticks, self._heard_ns = client, sticks, now_ns
-        self._released = False
-        self._neutral_owed = True
-        return True
+        """Take a page's sticks; False if they do not count."""
+        with self._lock:
+            self._expire(now_ns)
+            if self._holder not in (None, client) or client not in self._centred:
+                return False
+            self._holder, self._sticks, self._heard_ns = client, sticks, now_ns
+            self._held = self._neutral_owed = True
+            return True
 
     def release(self, client: int, now_ns: int) -> None:
-        """The page let go, or left."""
-        if client == self._holder and not self._released:
-            self._released = True
-            self._heard_ns = now_ns
+        """The page's sticks are in their middle."""
+        with self._lock:
+            self._expire(now_ns)
+            self._centred.add(client)
+            self._stale.discard(client)
+            if client == self._holder and self._held:
+                self._held = False
+                self._heard_ns = now_ns
 
-    def holder(self, now_ns: int) -> int | None:
-        """The page that holds the pad."""
-        if self._holder is not None and now_ns - self._heard_ns > HOLD_S * NS_PER_S:
-            self._holder = None
-        return self._holder
+    def leave(self, client: int, now_ns: int) -> None:
+        """The page is gone."""
+        self.release(client, now_ns)
+        with self._lock:
+            self._centred.discard(client)
+
+    def standing(self, client: int, now_ns: int) -> Standing:
+        """What the pad is to a page."""
+        with self._lock:
+            self._expire(now_ns)
+            if client in self._stale:
+                return "stale"
+            if self._holder is None:
+                return "free"
+            return "yours" if self._holder == client else "busy"
 
     def due(self, now_ns: int) -> Sticks | None:
         """The sticks to publish now: those held, neutral once after them, then nothing."""
-        fresh = now_ns - self._heard_ns <= STICK_MAX_AGE_S * NS_PER_S
-        if not self._released and fresh:
-            return self._sticks
-        if self._neutral_owed:
-            self._neutral_owed = False
-            return NEUTRAL
-        return None
+        with self._lock:
+            self._expire(now_ns)
+            if self._held:
+                return self._sticks
+            if self._neutral_owed:
+                self._neutral_owed = False
+                return NEUTRAL
+            return None
+
+    def _expire(self, now_ns: int) -> None:
+        silent_ns = now_ns - self._heard_ns
+        if self._held and self._holder is not None and silent_ns > STICK_MAX_AGE_NS:
+            self._held = False
+            self._centred.discard(self._holder)
+            self._stale.add(self._holder)
+        if silent_ns > HOLD_NS:
+            self._holder = None

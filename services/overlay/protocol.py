@@ -10,6 +10,7 @@ import math
 import msgspec
 
 from common.messages import Confidence, Count, DecideAction, Fraction
+from services.overlay.lease import Standing
 
 
 class ClientMessage(msgspec.Struct, frozen=True, tag_field="type", forbid_unknown_fields=True):
@@ -32,7 +33,7 @@ class StickMoved(ClientMessage, frozen=True, tag="stick"):
 
 
 class Released(ClientMessage, frozen=True, tag="release"):
-    """The page's sticks were let go."""
+    """The page's sticks are let go: said once when it connects, and after they were held."""
 
 
 class Decided(ClientMessage, frozen=True, tag="decide"):
@@ -93,8 +94,8 @@ class State(msgspec.Struct, frozen=True, tag_field="type", tag="state"):
     ages_s: dict[str, float | None]
     alive: list[str]
     linked: bool
-    pad: str
-    """`free`, `yours` or `busy`."""
+    pad: Standing
+    """What the pad is to this page."""
 
 
 _decoder: msgspec.json.Decoder[FromPage] = msgspec.json.Decoder(FromPage)

@@ -9,7 +9,7 @@ from services.overlay import protocol
 from services.overlay.config import Config
 from services.overlay.console import Console
 from services.overlay.core import Overlay
-from services.overlay.lease import PadLease
+from services.overlay.lease import PadLease, Standing
 
 STICK_PERIOD_S = 0.02
 AGES_SHOWN = ("camera/front", "pose", "stick", "autopilot", "vehicle")
@@ -66,7 +66,7 @@ def _console(node: Node, core: Overlay, config: Config) -> Console:
                 "console/stick", m.Stick(stamp=stamp_ns, seq=0, vx=vx, vy=vy, vz=vz, wz=wz)
             )
 
-    def state_of(pad: str) -> protocol.State:
+    def state_of(pad: Standing) -> protocol.State:
         return _state(node, core, sorted(alive), pad)
 
     console = Console(config.console_host, config.console_port, state_of, ask, lease, node.clock)
@@ -81,7 +81,7 @@ def _console(node: Node, core: Overlay, config: Config) -> Console:
     return console
 
 
-def _state(node: Node, core: Overlay, alive: list[str], pad: str) -> protocol.State:
+def _state(node: Node, core: Overlay, alive: list[str], pad: Standing) -> protocol.State:
     now_ns = node.clock.monotonic_ns()
     status, vehicle, intent = core.status, core.vehicle, core.intent
     shown = core.shown(now_ns)

@@ -33,12 +33,21 @@ VIDEO_TOPICS = ("camera/front", "camera/down")
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera of the vehicle."""
+    """A camera of the vehicle.
+
+    Attributes:
+        topic: where its pictures go.
+        lens: its size and projection.
+        mount: its place in the body.
+        fps: pictures a second.
+        near_m: it sees nothing nearer; the nearer, the less it tells far things apart.
+    """
 
     topic: str
     lens: Lens
     mount: Mount
     fps: float
+    near_m: float = 0.08
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +84,8 @@ def cameras_of(config: Config) -> tuple[Camera, ...]:
     down = Lens.of_view(config.down_width, config.down_height, math.radians(config.down_view_deg))
     return (
         Camera("camera/front", front, FRONT, config.front_fps),
-        Camera("camera/down", down, DOWN, config.down_fps),
+        # On the ground it is 25 mm above it.
+        Camera("camera/down", down, DOWN, config.down_fps, near_m=0.01),
     )
 
 

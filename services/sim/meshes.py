@@ -11,7 +11,7 @@ import numpy as np
 from common.frames import Array
 from worlds import Strip
 
-_CYLINDER_SIDES, _SPHERE_RINGS = 16, 10
+_CYLINDER_SIDES, _SPHERE_RINGS = 12, 10
 
 
 def box() -> Array:

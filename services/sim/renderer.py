@@ -13,7 +13,7 @@ import cv2
 import moderngl
 import numpy as np
 
-from common.camera import Lens, Mount
+from common.camera import Lens
 from common.frames import Array, rotation_of
 from services.sim import meshes, shaders
 from services.sim.core import Camera, Shot
@@ -21,7 +21,7 @@ from services.sim.stage import Scene
 from services.sim.textures import PIXELS, Picture, paint, patches, sky
 from worlds import Body, Texture
 
-NEAR_M, FAR_M = 0.08, 400.0
+FAR_M = 400.0
 PAINT_M = 0.003
 """Of each layer of paint on the ground, so that the upper hides the lower."""
 SEE_THROUGH = frozenset({"fence"})
@@ -102,7 +102,7 @@ class GlRenderer:
     def draw(self, camera: Camera, shot: Shot) -> Picture:
         """The picture (height, width, 3) in BGR; overwritten by the camera's next one."""
         target, pixels = self._target_of(camera.lens)
-        from_world, eye, _ = view_of(camera.lens, camera.mount, shot)
+        from_world, eye, _ = view_of(camera, shot)
         gl = self._gl
         target.use()
         gl.clear()
@@ -298,20 +298,21 @@ class _Flock:
         self.vertices.render(instances=len(seen))
 
 
-def view_of(lens: Lens, mount: Mount, shot: Shot) -> tuple[Array, Array, Array]:
+def view_of(camera: Camera, shot: Shot) -> tuple[Array, Array, Array]:
     """World to clip coordinates (4, 4), the eye's place (3,), and body to world (3, 3)."""
+    lens, mount, near_m = camera.lens, camera.mount, camera.near_m
     body_to_world = rotation_of(shot.orientation)
     eye = np.asarray(shot.position_m) + body_to_world @ np.asarray(mount.position_m)
     to_optical = np.eye(4)
     to_optical[:3, :3] = (body_to_world @ np.asarray(mount.body_from_optical)).T
     to_optical[:3, 3] = -to_optical[:3, :3] @ eye
     fx, fy, cx, cy = lens.intrinsics
-    depth = (FAR_M + NEAR_M) / (FAR_M - NEAR_M)
+    depth = (FAR_M + near_m) / (FAR_M - near_m)
     clip = np.asarray(
         [
             [2.0 * fx / lens.width, 0.0, (2.0 * cx + 1.0) / lens.width - 1.0, 0.0],
             [0.0, 2.0 * fy / lens.height, (2.0 * cy + 1.0) / lens.height - 1.0, 0.0],
-            [0.0, 0.0, depth, -NEAR_M * (1.0 + depth)],
+            [0.0, 0.0, depth, -near_m * (1.0 + depth)],
             [0.0, 0.0, 1.0, 0.0],
         ]
     )

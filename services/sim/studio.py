@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Literal, Protocol
 
+import cv2
+
 from common import messages as m
 from services.sim.core import Camera, Shot
 from services.sim.renderer import GlRenderer, NoOpenGlError, jpeg_of
@@ -96,6 +98,7 @@ class Studio:
         self._shots: dict[str, Shot] = {}
         self._scene: Scene | None = None
         self._stopping = False
+        self._ready = False
         self.taken: Counter[str] = Counter()
         self.dropped: Counter[str] = Counter()
         self.renderer = "starting"
@@ -114,7 +117,7 @@ class Studio:
         """Have pictures taken soon, or not at all if newer ones are asked for first."""
         with self._wake:
             for shot in shots:
-                if shot.topic in self._shots:
+                if shot.topic in self._shots and self._ready:
                     self.dropped[shot.topic] += 1
                 self._shots[shot.topic] = shot
             self._wake.notify()
@@ -127,10 +130,13 @@ class Studio:
         self._thread.join()
 
     def _run(self) -> None:
+        # More threads would only take turns with physics and with other services.
+        cv2.setNumThreads(1)
         try:
             renderer = open_renderer(self._choice)
             self.renderer = renderer.name
             log.info("pictures are drawn by %s", renderer.name)
+            self._ready = True
             while self._take_next(renderer):
                 pass
             renderer.close()

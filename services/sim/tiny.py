@@ -10,13 +10,13 @@ import pybullet
 
 from common.camera import Lens
 from services.sim.core import Camera, Shot
-from services.sim.renderer import FAR_M, NEAR_M, view_of
+from services.sim.renderer import FAR_M, view_of
 from services.sim.stage import Scene, add_body
 from services.sim.textures import Picture, paint
 from worlds import Texture
 
 GROUND_SIDE_M = 60.0
-_GROUND_PIXELS = 3000
+_GROUND_PIXELS = 2000
 _TO_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 """From the optical frame to OpenGL's camera frame: y up, looking along -z."""
 
@@ -77,23 +77,24 @@ class TinyRenderer:
 
 def matrices_of(camera: Camera, shot: Shot) -> tuple[list[float], list[float]]:
     """View and projection as pybullet wants them (16 floats, column by column)."""
-    _, eye, body_to_world = view_of(camera.lens, camera.mount, shot)
+    _, eye, body_to_world = view_of(camera, shot)
     to_optical = np.eye(4)
     to_optical[:3, :3] = (body_to_world @ np.asarray(camera.mount.body_from_optical)).T
     to_optical[:3, 3] = -to_optical[:3, :3] @ eye
     view = _TO_OPENGL @ to_optical
-    projection = _projection_of(camera.lens)
+    projection = _projection_of(camera.lens, camera.near_m)
     return view.T.ravel().tolist(), projection.T.ravel().tolist()
 
 
-def _projection_of(lens: Lens) -> Any:
+def _projection_of(lens: Lens, near_m: float) -> Any:
     fx, fy, cx, cy = lens.intrinsics
-    depth = (FAR_M + NEAR_M) / (NEAR_M - FAR_M)
+    depth = (FAR_M + near_m) / (near_m - FAR_M)
+    # It samples pixels at their lower left corners, while OpenCV counts from their centres.
     return np.asarray(
         [
-            [2.0 * fx / lens.width, 0.0, 1.0 - (2.0 * cx + 1.0) / lens.width, 0.0],
-            [0.0, 2.0 * fy / lens.height, (2.0 * cy + 1.0) / lens.height - 1.0, 0.0],
-            [0.0, 0.0, depth, NEAR_M * (depth - 1.0)],
+            [2.0 * fx / lens.width, 0.0, 1.0 - 2.0 * cx / lens.width, 0.0],
+            [0.0, 2.0 * fy / lens.height, 2.0 * (cy + 1.0) / lens.height - 1.0, 0.0],
+            [0.0, 0.0, depth, near_m * (depth - 1.0)],
             [0.0, 0.0, -1.0, 0.0],
         ]
     )

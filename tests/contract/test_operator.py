@@ -50,7 +50,7 @@ def test_sticks_are_sent_at_50_hz_in_order_and_neutral_when_nobody_holds_them(
     sticks = client.collect("stick")
     client.next("stick")
     begin = len(sticks)
-    time.sleep(2.0)
+    time.sleep(1.5)
     part = sticks[begin:]
     arrivals = sticks.arrival_s[begin : begin + len(part)]
     rate_hz = (len(part) - 1) / (arrivals[-1] - arrivals[0])
@@ -85,15 +85,10 @@ def test_the_browsers_sticks_are_passed_on_and_never_old(
     assert time.monotonic() - begin_s > 0.5
 
 
-def test_bad_console_sticks_are_dropped_and_counted(console: Process, client: Client) -> None:
-    assert_bad_input_is_dropped_and_counted(client, "operator", "console/stick", "Stick")
-
-
 def test_health_says_who_flies(console: Process, client: Client) -> None:
-    health = client.next("health/operator")
+    health = client.next("health/operator", lambda h: h["detail"] == "source console")
     assert health["service"] == "operator"
     assert health["state"] == "ok"
-    assert health["detail"] == "source console"
     assert set(health["rates"]) == {"console/stick"}
     assert 0.0 <= health["latency_p50"] <= health["latency_p99"] < 0.02
     assert "operator" in client.alive()
@@ -111,43 +106,46 @@ def other(port: int, vehicle: str) -> Iterator[Client]:
         client.close()
 
 
-@pytest.mark.parametrize(
-    ("source", "state", "detail"), [("pad", "degraded", "none is plugged in"), ("auto", "ok", "no")]
-)
 def test_without_a_pad_sticks_are_neutral_and_health_says_so(
-    source: str, state: str, detail: str, router: zenoh.Session, port: int, launch: Launch
+    router: zenoh.Session, port: int, launch: Launch
 ) -> None:
-    with other(port, source) as client:
-        process = start_service(launch, client, "operator", "--source", source, "--vehicle", source)
-        assert deflection(client.next("stick")) == 0.0
-        health = client.next("health/operator")
-        assert health["state"] == state
-        assert detail in health["detail"]
-        assert process.stop() == 0
+    with other(port, "pad") as pad, other(port, "auto") as auto:
+        processes = [
+            launch("operator", "--source", client.vehicle, "--vehicle", client.vehicle)
+            for client in (pad, auto)
+        ]
+        for client, state, detail in (
+            (pad, "degraded", "none is plugged in"),
+            (auto, "ok", "source console"),
+        ):
+            client.wait_alive("operator")
+            assert deflection(client.next("stick")) == 0.0
+            health = client.next("health/operator")
+            assert health["state"] == state
+            assert detail in health["detail"]
+        for process in processes:
+            assert process.stop() == 0
 
 
-def test_a_keyboard_without_a_screen_is_refused_in_one_line(
+REFUSED = (
+    (("--source", "keyboard"), "needs a screen"),
+    (("--source", "mind"), "source"),
+    (("--laps", "-1"), "laps"),
+    (("--pad", "wheel"), "pad"),
+    (("--source", "scripted", "--world", "nowhere"), "world"),
+    (("--source", "scripted", "--world", "empty"), "world"),
+)
+
+
+def test_what_cannot_be_had_is_refused_in_one_line_that_names_it(
     router: zenoh.Session, launch: Launch
 ) -> None:
-    process = launch("operator", "--source", "keyboard", "--vehicle", "keys")
-    assert process.popen.wait(20.0) == 1
-    complaint = [line for line in process.log.read_text().splitlines() if "screen" in line]
-    assert len(complaint) == 1
-    assert "Traceback" not in process.log.read_text()
-
-
-@pytest.mark.parametrize(
-    "flags", [("--source", "mind"), ("--laps", "-1"), ("--pad", "wheel"), ("--world", "nowhere")]
-)
-def test_a_wrong_setting_is_an_error_that_names_it(
-    flags: tuple[str, str], router: zenoh.Session, launch: Launch
-) -> None:
-    extra = ("--source", "scripted") if flags[0] == "--world" else ()
-    process = launch("operator", "--vehicle", "wrong", *flags, *extra)
-    assert process.popen.wait(20.0) in (1, 2)
-    log = process.log.read_text()
-    assert flags[0][2:] in log
-    assert "Traceback" not in log
+    started = [(launch("operator", "--vehicle", "wrong", *flags), word) for flags, word in REFUSED]
+    for process, word in started:
+        assert process.popen.wait(20.0) in (1, 2)
+        log = process.log.read_text()
+        assert sum(word in line for line in log.splitlines()) == 1, log
+        assert "Traceback" not in log
 
 
 # --- the scripted operator ------------------------------------------------------------------------
@@ -193,7 +191,7 @@ class Field:
             self.requests.append((request, deflection(self.sticks[-1])))
             time.sleep(self.answer_after_s)
             if request["action"] == "takeoff":
-                self.state, self.z = "flying", 0.6
+                self.state, self.z = "flying", 0.75
             elif request["action"] == "accept":
                 self.mode = "engaged"
             reply = {"ok": True, "reason": "accepted", "mode": self.mode}
@@ -241,7 +239,6 @@ def test_the_scripted_operator_waits_takes_off_climbs_flies_and_accepts(
             field.answer_after_s = 0.0
             assert client.next("stick", lambda m: deflection(m) > 0.0)["vz"] > 0.0
             client.next("stick", lambda m: m["vx"] > 0.7)
-            assert "mission steering" in client.next("health/operator")["detail"]
 
             x, y, z = field.x, field.y, field.z
             path = [[x + 0.1 * i, y, z, 0.0] for i in range(200)]
@@ -249,21 +246,20 @@ def test_the_scripted_operator_waits_takes_off_climbs_flies_and_accepts(
             request, deflected = field.wait_for("accept", 5.0)
             assert request["suggestion"] == 41
             assert deflected == 0.0
-            client.next("health/operator")
-            detail = client.next("health/operator")["detail"]
-            assert detail.startswith("mission watching")
+            detail = client.next(
+                "health/operator", lambda h: h["detail"].startswith("mission watching")
+            )["detail"]
             assert "suggestions 1 accepted 1 takeovers 0" in detail
-            assert all(deflection(m) == 0.0 for m in field.sticks[-20:])
+            assert all(deflection(m) == 0.0 for m in field.sticks[-5:])
 
             # A human at the console wins over the simulated one.
             with contextlib.closing(Streams(client)) as human:
                 human.add("console/stick", 50.0, lambda t: {**NEUTRAL, "vy": 0.6 * (t > 0.1)})
                 client.next("stick", lambda m: m["vy"] == 0.6)
-                health = client.next("health/operator", lambda h: "console" in h["detail"])
         assert process.stop() == 0
 
 
-def test_bad_input_of_the_scripted_operator_is_dropped_and_counted(
+def test_bad_input_on_any_topic_is_dropped_and_counted(
     router: zenoh.Session, port: int, launch: Launch
 ) -> None:
     with other(port, "bad") as client:
@@ -271,12 +267,13 @@ def test_bad_input_of_the_scripted_operator_is_dropped_and_counted(
             launch, client, "operator", "--source", "scripted", "--vehicle", "bad"
         )
         client.collect("health/operator")
-        with ThreadPoolExecutor() as pool:
+        with ThreadPoolExecutor(5) as pool:
             checks = [
                 pool.submit(
                     assert_bad_input_is_dropped_and_counted, client, "operator", topic, message
                 )
                 for topic, message in (
+                    ("console/stick", "Stick"),
                     ("truth", "Pose"),
                     ("autopilot", "AutopilotStatus"),
                     ("suggestion", "Suggestion"),

@@ -36,6 +36,11 @@ class Primitive:
     family: str
 
 
+def counts_of(multiple: float) -> dict[str, int]:
+    """The thesis' counts by label, times `multiple`."""
+    return {label: max(1, round(count * multiple)) for label, count in THESIS_COUNTS.items()}
+
+
 def perform(
     label: str, family: Family, who: Operator, number: int, rng: np.random.Generator
 ) -> Primitive:

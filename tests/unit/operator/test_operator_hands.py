@@ -57,7 +57,7 @@ def test_a_wish_that_hardly_changes_does_not_move_a_thumb() -> None:
         thumbs.step(Deflection(vx=0.8), STEP_S)
     before = thumbs.step(Deflection(vx=0.8), STEP_S)
     for _ in range(100):
-        after = thumbs.step(Deflection(vx=0.83), STEP_S)
+        after = thumbs.step(Deflection(vx=0.815), STEP_S)
     assert before == after
 
 

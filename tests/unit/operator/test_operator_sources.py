@@ -71,6 +71,27 @@ def test_an_old_console_stick_is_neutral_and_must_pass_neutral_again() -> None:
     assert sources.step(again_ns, None).sticks == NEUTRAL
 
 
+def test_a_console_that_was_silent_counts_from_its_first_stick() -> None:
+    sources = Sources()
+    sources.step(0, None)
+    sources.step(2 * MAX_AGE_NS, None)
+    sources.console_stick(stick(LEFT), 3 * MAX_AGE_NS)
+    assert sources.step(3 * MAX_AGE_NS, None).sticks == LEFT
+    sources.console_stick(stick(NEUTRAL), 4 * MAX_AGE_NS)
+    assert sources.step(4 * MAX_AGE_NS, None).sticks == NEUTRAL
+    # It says nothing while nobody holds its sticks.
+    sources.step(9 * MAX_AGE_NS, None)
+    sources.console_stick(stick(FORWARD), 10 * MAX_AGE_NS)
+    assert sources.step(10 * MAX_AGE_NS, None).sticks == FORWARD
+
+
+def test_a_console_whose_sticks_are_held_when_the_operator_starts_must_pass_neutral() -> None:
+    sources = Sources()
+    for tick in range(50):
+        sources.console_stick(stick(LEFT), tick * TICK_NS)
+        assert sources.step(tick * TICK_NS, None).sticks == NEUTRAL
+
+
 def test_neutral_between_two_steps_is_enough_for_the_console() -> None:
     sources = Sources()
     sources.console_stick(stick(NEUTRAL), 0)

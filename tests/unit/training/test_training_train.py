@@ -55,7 +55,7 @@ def test_a_run_leaves_a_model_its_card_and_its_figures(tmp_path: Path) -> None:
     assert run.parity < 1e-5
     card = (tmp_path / "README.md").read_text()
     assert run.sha256 in card
-    assert "SVM of the thesis" in card
+    assert "SVM (thesis)" in card
     figures = json.loads((tmp_path / "intent.json").read_text())
     ours = figures["classifiers"]["CNN-GRU"]
     assert f"{ours['f1']:.3f}" in card
@@ -77,7 +77,7 @@ def test_the_same_seed_gives_the_same_file(tmp_path: Path) -> None:
 def test_the_command_prints_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["train", "--preset", "quick", "--seed", "1", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
-    for word in ("CNN-GRU", "SVM", "interval", "1.5 s", "helix"):
+    for word in ("CNN-GRU", "SVM (thesis)", "interval", "1.5 s", "helix"):
         assert word in printed
     assert (tmp_path / "intent.onnx").exists()
 
