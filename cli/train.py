@@ -102,7 +102,8 @@ def _run(options: argparse.Namespace) -> int:
 def _report(console: Console, run: "Run") -> None:
     whole = run.judged[0].whole
     table = Table(
-        box=SIMPLE,
+        box=None,
+        padding=(0, 2, 0, 0),
         title=f"{whole.count} primitives of {whole.operators} operators held out",
         caption="F1 is weighted by class: at the end with its 95 % interval over operators,"
         " and so many seconds after the beginning. ECE: expected calibration error.",
@@ -110,7 +111,7 @@ def _report(console: Console, run: "Run") -> None:
     for heading in ("classifier", "accuracy", "F1", "interval"):
         table.add_column(heading, no_wrap=True)
     for after, _ in run.judged[0].early:
-        table.add_column(f"{after:g} s")
+        table.add_column(f"{after:g} s", no_wrap=True)
     table.add_column("ECE")
     for judged in run.judged:
         error = "-" if judged.calibration is None else f"{judged.calibration:.3f}"

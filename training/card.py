@@ -29,6 +29,11 @@ def _confusion(judged: "Judged") -> str:
     return head + "".join(rows)
 
 
+def primitives(multiple: float) -> int:
+    """How many there are in a set of a multiple of the thesis' counts."""
+    return sum(counts_of(multiple).values())
+
+
 def card_of(run: "Run") -> str:
     """The card as Markdown."""
     first = run.judged[0]
@@ -59,8 +64,8 @@ pilots, and three sets of people that share nobody.
 
 | set | operators | primitives |
 |---|---|---|
-| training | {preset.operators} | {sum(counts_of(preset.multiple).values())} |
-| validation | {preset.validation_operators} | {sum(counts_of(preset.validation_multiple).values())} |
+| training | {preset.operators} | {primitives(preset.multiple)} |
+| validation | {preset.validation_operators} | {primitives(preset.validation_multiple)} |
 | test | {preset.test_operators} | {whole.count} |
 
 Classes are as frequent as in the thesis. {epochs} epochs, temperature {run.fitted.temperature:.2f}.

@@ -52,12 +52,11 @@ def score(truth: IntArray, said: IntArray, operators: IntArray, classes: int, se
         ]
     )
     draws = rng.integers(0, len(people), (BOOTSTRAPS, len(people)))
-    f1s = [_f1_of(tables[draw].sum(axis=0)) for draw in draws]
-    low, high = np.percentile(f1s, [2.5, 97.5])
+    low, high = np.percentile(_f1_of(tables[draws].sum(axis=1)), [2.5, 97.5])
     table = tables.sum(axis=0)
     return Score(
         accuracy=float(np.trace(table) / table.sum()),
-        f1=_f1_of(table),
+        f1=float(_f1_of(table)),
         interval=(float(low), float(high)),
         confusion=table,
         count=len(truth),
@@ -65,11 +64,12 @@ def score(truth: IntArray, said: IntArray, operators: IntArray, classes: int, se
     )
 
 
-def _f1_of(table: IntArray) -> float:
-    right = np.diag(table).astype(float)
-    was, said = table.sum(axis=1), table.sum(axis=0)
+def _f1_of(tables: IntArray) -> NDArray[np.float64]:
+    """Weighted F1 (...) of confusion matrices (..., classes, classes)."""
+    right = np.diagonal(tables, axis1=-2, axis2=-1)
+    was, said = tables.sum(axis=-1), tables.sum(axis=-2)
     f1 = 2.0 * right / np.maximum(was + said, 1)
-    return float((f1 * was).sum() / was.sum())
+    return np.asarray((f1 * was).sum(axis=-1) / was.sum(axis=-1))
 
 
 def calibration_error(probabilities: NDArray[np.float64], truth: IntArray) -> float:

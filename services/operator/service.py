@@ -16,6 +16,9 @@ from services.operator.sources import Output, Reading, Sources
 STICK_RATE_HZ = TOPICS["stick"].rate_hz or 50.0
 PERIOD_S = 1.0 / STICK_RATE_HZ
 
+WAITING = 8
+"""Sticks and poses kept for a step that is late: a neutral stick among them counts."""
+
 HealthReport = tuple[m.HealthState, str]
 
 
@@ -41,7 +44,7 @@ def wire(node: Node, config: Config) -> None:
     decisions = Decisions(node)
     last = Output()
     node.publishes("stick")
-    node.on("console/stick", sources.console_stick)
+    node.on("console/stick", sources.console_stick, depth=WAITING)
     device = _device_of(node, config, decisions, lambda: last.is_console)
 
     def step(now_ns: int) -> None:
@@ -145,7 +148,7 @@ class _Scripted:
         self._pilot = Pilot(_route(config.world), person, PERIOD_S)
         self._decisions = decisions
         self._is_overridden = is_overridden
-        node.on("truth", self._pilot.truth)
+        node.on("truth", self._pilot.truth, depth=WAITING)
         node.on("autopilot", self._pilot.autopilot)
         node.on("suggestion", self._pilot.suggestion)
         node.on("vehicle", self._pilot.vehicle)

@@ -13,11 +13,11 @@ from common.camera import FRONT, NEAR_M, Lens, project, to_optical
 from common.frames import Array, rotation_of
 from common.messages import Pose, Suggestion
 
-FIRST_M = 0.9
+FIRST_M = 1.2
 """The nearest arrow is this far ahead along the path: nearer ones are below the picture."""
 SPACING_M = 0.7
 LENGTH_M = 0.5
-WIDTH_M = 0.5
+WIDTH_M = 0.4
 NOTCH = 0.45
 """How deep the tail is cut, as a part of the length."""
 FADED = 0.15
@@ -109,7 +109,7 @@ def arrows_of(
     arrows: list[Arrow] = []
     for corners, distance_m in zip(corners_m[::-1], distances_m[::-1], strict=True):
         optical = to_optical(_subdivided(corners), position_m, rotation, FRONT)
-        if float(optical[:, 2].min()) <= NEAR_M:
+        if float(optical[:, 2].min()) <= NEAR_M or _folds(optical, lens):
             continue
         pixels, _ = project(optical, lens)
         if not _touches(pixels, lens):
@@ -117,6 +117,13 @@ def arrows_of(
         opacity = 1.0 - (1.0 - FADED) * float(distance_m) / length_m
         arrows.append(Arrow(pixels, opacity, float(distance_m)))
     return arrows
+
+
+def _folds(optical_m: Array, lens: Lens) -> bool:
+    """Whether a point is so far aside that the lens' polynomial bends it back into the picture."""
+    k1, k2, _, _ = lens.distortion
+    r2 = np.sum((optical_m[:, :2] / optical_m[:, 2:]) ** 2, axis=1)
+    return bool((1.0 + 3.0 * k1 * r2 + 5.0 * k2 * r2 * r2).min() <= 0.0)
 
 
 def _touches(pixels: NDArray[np.float64], lens: Lens) -> bool:

@@ -14,6 +14,8 @@ ENGAGED: Colour = (110, 220, 70)
 WARNING: Colour = (70, 90, 255)
 TEXT: Colour = (245, 245, 245)
 EDGE: Colour = (20, 20, 20)
+RIM = 0.65
+"""How far an arrow's rim is from its colour to white."""
 
 STRIP_PX = 24
 _SUBPIXEL_BITS = 4
@@ -31,8 +33,11 @@ def draw_arrow(picture: Picture, arrow: Arrow, colour: Colour) -> None:
     region = picture[y0:y1, x0:x1]
     painted = region.copy()
     outline = np.round((arrow.outline_px - (x0, y0)) * (1 << _SUBPIXEL_BITS)).astype(np.int32)
+    # Dark outside, light inside: one of the two shows on any ground.
+    cv2.polylines(painted, [outline], True, EDGE, 3, cv2.LINE_AA, _SUBPIXEL_BITS)
+    rim = tuple(round(part + RIM * (255 - part)) for part in colour)
     cv2.fillPoly(painted, [outline], colour, cv2.LINE_AA, _SUBPIXEL_BITS)
-    cv2.polylines(painted, [outline], True, EDGE, 1, cv2.LINE_AA, _SUBPIXEL_BITS)
+    cv2.polylines(painted, [outline], True, rim, 1, cv2.LINE_AA, _SUBPIXEL_BITS)
     cv2.addWeighted(painted, arrow.opacity, region, 1.0 - arrow.opacity, 0.0, region)
 
 

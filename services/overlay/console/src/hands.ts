@@ -15,7 +15,8 @@ function isNeutral(sticks: Sticks): boolean {
 
 /** Sends the sticks of the first source that moves at 50 Hz, and one release after the last. */
 export class Hands {
-  private held = false;
+  // A new server is told once that nothing is held: sticks count only after that.
+  private held = true;
 
   constructor(
     private readonly sources: readonly Source[],
@@ -26,10 +27,16 @@ export class Hands {
     for (const event of ["blur", "pagehide"]) addEventListener(event, () => this.release());
   }
 
+  /** The connection is new. */
+  begin(): void {
+    this.held = true;
+  }
+
   private tick(): void {
     const sticks =
       this.sources.map((source) => source.read()).find((each) => !isNeutral(each)) ?? NEUTRAL;
-    if (isNeutral(sticks)) {
+    // A hidden page reads a pad as it was when the page was hidden.
+    if (document.hidden || isNeutral(sticks)) {
       this.release();
       return;
     }

@@ -30,6 +30,8 @@ export class Keyboard implements Source {
 
   constructor(act: (action: Action) => void) {
     addEventListener("keydown", (event) => {
+      // Ctrl+L and its like belong to the browser.
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
       const action = ACTIONS[event.code];
       if (event.code in MOVES) this.down.add(event.code);
       else if (action !== undefined && !event.repeat) act(action);

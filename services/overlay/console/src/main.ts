@@ -18,7 +18,10 @@ const connection = new Connection({
     else if (message.type === "decision") view.answer(message);
     else view.problem(message.error);
   },
-  link: (up) => view.link(up),
+  link: (up) => {
+    view.link(up);
+    if (up) hands.begin();
+  },
 });
 
 function act(action: Action): void {
@@ -41,4 +44,6 @@ for (const action of ["accept", "cancel", "takeoff", "land", "emergency"] as con
 }
 
 const thumbs = new Thumbs(element("left-thumb"), element("right-thumb"));
-new Hands([new Pad(act), new Keyboard(act), thumbs], (message) => connection.send(message));
+const hands = new Hands([new Pad(act), new Keyboard(act), thumbs], (message) =>
+  connection.send(message),
+);

@@ -1,8 +1,10 @@
 import type { Source } from "./hands";
 import { NEUTRAL, type Action, type Sticks } from "./protocol";
 
-// The "standard" mapping of the Gamepad API; left stick moves, right stick climbs and turns.
-const BUTTONS: Record<number, Action> = { 0: "accept", 1: "cancel", 8: "land", 9: "takeoff" };
+// The "standard" mapping of the Gamepad API; left stick moves, right stick climbs and turns, the
+// shoulders decide: as the operator service has it for a pad that is plugged in there.
+const BUTTONS: Record<number, Action> = { 4: "cancel", 5: "accept", 8: "land", 9: "takeoff" };
+const REST = 0.1;
 
 /** The first pad that the browser knows. */
 export class Pad implements Source {
@@ -20,7 +22,10 @@ export class Pad implements Source {
       if (action !== undefined && !this.pressed.has(index)) this.act(action);
     }
     this.pressed = pressed;
-    const axis = (index: number) => -(pad.axes[index] ?? 0);
+    const axis = (index: number) => {
+      const value = -(pad.axes[index] ?? 0);
+      return Math.abs(value) <= REST ? 0 : value;
+    };
     return { vx: axis(1), vy: axis(0), vz: axis(3), wz: axis(2) };
   }
 }

@@ -26,7 +26,7 @@ export interface State {
   ages_s: Record<string, number | null>;
   alive: string[];
   linked: boolean;
-  pad: "free" | "yours" | "busy";
+  pad: "free" | "yours" | "busy" | "stale";
 }
 
 export interface Answer {

@@ -35,7 +35,7 @@ class Thumb {
   }
 }
 
-/** Two thumb pads: left climbs and turns, right moves. */
+/** Two thumb pads, as on a pad: left moves, right climbs and turns. */
 export class Thumbs implements Source {
   private readonly left: Thumb;
   private readonly right: Thumb;
@@ -47,6 +47,6 @@ export class Thumbs implements Source {
 
   read(): Sticks {
     const { left, right } = this;
-    return { vx: right.y, vy: -right.x, vz: left.y, wz: -left.x };
+    return { vx: left.y, vy: -left.x, vz: right.y, wz: -right.x };
   }
 }

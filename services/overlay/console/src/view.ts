@@ -18,6 +18,11 @@ function percent(fraction: number): string {
   return `${Math.round(100 * fraction)} %`;
 }
 
+function ago(age_s: number | null): string {
+  if (age_s === null) return "never";
+  return age_s < 1 ? `${Math.round(1000 * age_s)} ms` : `${age_s.toFixed(0)} s`;
+}
+
 /** Everything around the picture. */
 export class View {
   private readonly bars = new Map<string, HTMLElement>();
@@ -26,6 +31,7 @@ export class View {
   link(up: boolean): void {
     document.body.dataset["link"] = up ? "up" : "down";
     element("link").textContent = up ? "connected" : "no console server";
+    if (!up) this.veil("No connection to the console's server");
   }
 
   state(state: State): void {
@@ -44,13 +50,19 @@ export class View {
       free: "free: move a stick to fly",
       yours: "you fly",
       busy: "another console flies",
+      stale: "let go first: the link had a gap",
     }[state.pad];
     element("services").replaceChildren(
       ...state.alive.map((name) => Object.assign(document.createElement("li"), { textContent: name })),
     );
     const age_s = state.ages_s["camera/front"] ?? null;
-    element("veil").hidden = age_s !== null && age_s < 1;
+    this.veil(age_s !== null && age_s < 1 ? "" : "Waiting for pictures");
     if (performance.now() > this.answerUntil_ms) element("answer").textContent = "";
+  }
+
+  private veil(text: string): void {
+    element("veil").textContent = text;
+    element("veil").hidden = text === "";
   }
 
   answer(answer: Answer): void {
@@ -98,7 +110,7 @@ export class View {
   }
 
   private facts(state: State): void {
-    const facts: [string, string, boolean][] = [
+    this.list("facts", [
       ["state", state.vehicle_state.replaceAll("_", " "), false],
       ["world", state.world || "unknown", false],
       [
@@ -108,13 +120,19 @@ export class View {
       ],
       ["collisions", String(state.collisions), state.collisions > 0],
       ["pose", state.pose_status, state.pose_status !== "ok"],
-    ];
-    for (const [topic, limit_s] of Object.entries(STALE_S)) {
-      const age_s = state.ages_s[topic] ?? null;
-      const text = age_s === null ? "never" : `${Math.round(1000 * age_s)} ms ago`;
-      facts.push([topic, text, age_s === null || age_s > limit_s]);
-    }
-    element("facts").replaceChildren(
+    ]);
+    this.list(
+      "ages",
+      Object.entries(STALE_S).map(([topic, limit_s]) => {
+        const age_s = state.ages_s[topic] ?? null;
+        const isBad = age_s === null || age_s > limit_s;
+        return [topic.replace("/", " "), ago(age_s), isBad];
+      }),
+    );
+  }
+
+  private list(id: string, facts: [string, string, boolean][]): void {
+    element(id).replaceChildren(
       ...facts.flatMap(([name, text, isBad]) => {
         const value = Object.assign(document.createElement("dd"), { textContent: text });
         value.classList.toggle("bad", isBad);

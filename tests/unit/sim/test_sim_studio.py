@@ -1,0 +1,96 @@
+"""Pictures are taken beside physics: the newest shot wins, and what draws them is chosen openly."""
+
+import threading
+
+import numpy as np
+import pytest
+
+from common.messages import Image, Message
+from services.sim import studio
+from services.sim.config import Config
+from services.sim.core import Camera, Shot, cameras_of
+from services.sim.renderer import NoOpenGlError
+from services.sim.stage import Scene
+from services.sim.textures import Picture
+
+CAMERAS = cameras_of(Config())
+
+
+class SlowRenderer:
+    """Draws nothing, when it is let."""
+
+    name = "slow"
+
+    def __init__(self) -> None:
+        self.drawing = threading.Event()
+        self.go_on = threading.Semaphore(0)
+
+    def load(self, scene: Scene) -> None:
+        pass
+
+    def draw(self, camera: Camera, shot: Shot) -> Picture:
+        self.drawing.set()
+        assert self.go_on.acquire(timeout=5.0)
+        return np.zeros((camera.lens.height, camera.lens.width, 3), np.uint8)
+
+    def close(self) -> None:
+        pass
+
+
+def front_at(stamp_ns: int) -> tuple[Shot, ...]:
+    return (Shot("camera/front", stamp_ns, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0)),)
+
+
+def test_a_slow_renderer_drops_pictures_and_holds_up_nobody(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    renderer = SlowRenderer()
+    monkeypatch.setattr(studio, "open_renderer", lambda _choice: renderer)
+    taken: list[Message] = []
+    arrived = threading.Event()
+
+    def publish(_topic: str, message: Message) -> None:
+        taken.append(message)
+        if len(taken) == 2:
+            arrived.set()
+
+    cameras = studio.Studio("gl", CAMERAS, 80, publish)
+    cameras.take(front_at(1))
+    assert renderer.drawing.wait(5.0)
+    for stamp_ns in range(2, 10):
+        cameras.take(front_at(stamp_ns))
+    renderer.go_on.release(2)
+    assert arrived.wait(5.0)
+    cameras.close()
+    assert [message.stamp for message in taken] == [1, 9]
+    assert cameras.dropped["camera/front"] == 7
+    first = taken[0]
+    assert isinstance(first, Image)
+    assert (first.width, first.height, first.capture) == (640, 360, 1)
+
+
+def test_without_opengl_pybullet_draws_unless_opengl_was_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail() -> None:
+        raise NoOpenGlError("none here")
+
+    monkeypatch.setattr(studio, "GlRenderer", fail)
+    fallback = studio.open_renderer("auto")
+    assert "TinyRenderer" in fallback.name
+    fallback.close()
+    with pytest.raises(NoOpenGlError):
+        studio.open_renderer("gl")
+
+
+def test_a_renderer_that_fails_is_told_and_ends_only_the_pictures(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(_choice: str) -> studio.Renderer:
+        raise NoOpenGlError("none here")
+
+    monkeypatch.setattr(studio, "open_renderer", fail)
+    cameras = studio.Studio("gl", CAMERAS, 80, lambda _topic, _message: None)
+    cameras.close()
+    assert cameras.failure == "none here"
+    cameras.take(front_at(1))
