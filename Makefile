@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --disable-pip-version-check -c constraints.t
 SCRIPTS := .ci/run deploy/install
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo up check test test-compose bench train lock docs format clean
+.PHONY: help setup demo up check test test-compose bench train picture lock docs format clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -70,6 +70,9 @@ bench: setup $(VENV)/.all ## rates and latencies of the whole chain, as a table
 
 train: $(VENV)/.all ## train the model anew into models/
 	$(BIN)/autocomplete train $(ARGS)
+
+picture: setup $(VENV)/.all ## the README's picture anew: flies the demo and photographs the console
+	$(BIN)/python docs/picture.py
 
 lock: $(BIN)/python ## renew constraints.txt to the newest versions that fit pyproject.toml
 	$(BIN)/python -m pip install --quiet pip-tools

@@ -30,10 +30,11 @@ _QOS: dict[Delivery, dict[str, Any]] = {
         "congestion_control": zenoh.CongestionControl.DROP,
         "express": True,
     },
+    # Not express: each express message takes a whole batch of the queue, and of bursts of 100 on a
+    # busy machine 8.5 % were dropped; in batches none of 2000 were, for at most 1 ms more.
     Delivery.EVENT: {
         "priority": zenoh.Priority.INTERACTIVE_HIGH,
         "congestion_control": zenoh.CongestionControl.DROP,
-        "express": True,
     },
 }
 _VIDEO_QOS: dict[str, Any] = {

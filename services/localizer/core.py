@@ -28,13 +28,12 @@ from services.localizer.filter import (
 )
 from services.localizer.flow import Key, Picture
 from services.localizer.ground import LEAST_HEIGHT_M, LEAST_POINTS, View, displacement
+from services.localizer.rotation import quaternion_of
 
 SOURCE = "imu+altimeter+flow"
 IMU_SILENT_S = TOPICS["imu"].max_age_s
-STAMP_JUMP_S = 1.0
+STAMP_JUMP_S = 3.0
 """A gap between two samples that cannot be bridged: another vehicle, or another time."""
-GAP_MPS2, GAP_RADPS = 2.0, 0.2
-"""How the vehicle may have moved in a gap that is bridged, one sigma."""
 ALIGN_SAMPLES = 40
 """Samples averaged at the start: 0.2 s."""
 ALIGN_SAMPLES_UNTOLD = 200
@@ -75,6 +74,8 @@ class Localizer:
     def __init__(self, config: Config) -> None:
         self._config = config
         self._pose_period_ns = nanoseconds(1.0 / config.pose_rate_hz)
+        # A little less than a period, as a camera's frames do not fall on it exactly.
+        self._flow_period_ns = nanoseconds(0.9 / config.flow_rate_hz)
         self._vehicle: VehicleStatus | None = None
         self._restart()
 
@@ -87,6 +88,7 @@ class Localizer:
         self._batched = 0
         self._gate = AltimeterGate(self._config.altimeter_noise_m, self._config.altimeter_jump_m)
         self._key: Key | None = None
+        self._last_capture_ns: int | None = None
         self._flow_refused = 0
         self._next_pose_ns = 0
         self._imu_arrival_ns: int | None = None
@@ -119,7 +121,7 @@ class Localizer:
             if not 0.0 < dt_s < STAMP_JUMP_S:
                 self._restart()
             elif dt_s > IMU_SILENT_S:
-                self._filter.loosen(GAP_MPS2 * dt_s, GAP_RADPS * dt_s)
+                self._filter.bridge(imu.stamp)
         if self._imu_arrival_ns is None:
             self._altimeter_arrival_ns = self._flow_arrival_ns = now_ns
         self._imu_arrival_ns = now_ns
@@ -176,8 +178,12 @@ class Localizer:
             ValueError: if the picture cannot be used.
         """
         state = self._filter
-        if state is None:
+        last_ns = self._last_capture_ns
+        if state is None or (
+            last_ns is not None and 0 <= image.capture - last_ns < self._flow_period_ns
+        ):
             return
+        self._last_capture_ns = image.capture
         picture = Picture(image)
         snapshot = state.at(picture.capture_ns)
         if snapshot is None or self._standing:
@@ -297,7 +303,7 @@ class Localizer:
             self._flow_refused += 1
             if self._flow_refused >= FLOW_REFUSALS:
                 self._flow_refused = 0
-                state.loosen(FLYING_SPEED_SIGMA_MPS, 0.0)
+                state.loosen(FLYING_SPEED_SIGMA_MPS)
                 return False
             return True
         self._flow_refused = 0
@@ -386,7 +392,7 @@ class Localizer:
             stamp=state.stamp_ns,
             seq=0,
             position=_triple(state.position_m),
-            orientation=_quaternion(state.rotation),
+            orientation=quaternion_of(state.rotation),
             velocity=_triple(state.velocity_mps),
             angular_velocity=_triple(state.rate_radps),
             covariance=(
@@ -403,11 +409,6 @@ class Localizer:
 def _triple(values: Array) -> tuple[float, float, float]:
     x, y, z = values.tolist()
     return x, y, z
-
-
-def _quaternion(rotation: Array) -> tuple[float, float, float, float]:
-    x, y, z, w = Rotation.from_matrix(rotation).as_quat().tolist()
-    return x, y, z, w
 
 
 def _yaw(rotation: Array) -> float:

@@ -9,10 +9,10 @@ that a displacement against it corrects both ends and a hover does not drift.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from common.clock import seconds
+from common.clock import nanoseconds, seconds
 from common.frames import Array
+from services.localizer.rotation import cross_matrix, orthonormal, rotation_by
 
 GRAVITY_MPS2 = 9.81
 
@@ -25,21 +25,14 @@ KEY_POSITION = slice(15, 18)
 KEY_ROTATION = slice(18, 21)
 SIZE = 21
 
+GAP_MPS2, GAP_RADPS = 1.0, 0.2
+"""How the vehicle may have moved in a gap without samples, one sigma."""
+
+_SAMPLE_S = 0.005
 _HISTORY = 64
 """Past states kept: 0.32 s at 200 Hz, more than a picture takes to arrive."""
 _REACH_S = 0.02
 """From one sample to a stamp after it, by its rates."""
-
-
-def cross_matrix(vector: Array) -> Array:
-    """The 3x3 matrix that multiplies like `vector` x."""
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def rotation_by(vector_rad: Array) -> Array:
-    """The 3x3 rotation by a rotation vector."""
-    return np.asarray(Rotation.from_rotvec(vector_rad).as_matrix(), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -102,12 +95,13 @@ class ErrorStateFilter:
         """Move on to `stamp_ns` by one sample of body rates and specific force."""
         dt_s = seconds(stamp_ns - self.stamp_ns)
         self.rate_radps = rate_radps - self.gyro_bias_radps
-        middle = self.rotation @ rotation_by(self.rate_radps * (0.5 * dt_s))
+        half_turn = rotation_by(self.rate_radps * (0.5 * dt_s))
+        middle = self.rotation @ half_turn
         force = middle @ (force_mps2 - self.accel_bias_mps2)
         acceleration = force - (0.0, 0.0, GRAVITY_MPS2)
         self.position_m += self.velocity_mps * dt_s + acceleration * (0.5 * dt_s * dt_s)
         self.velocity_mps += acceleration * dt_s
-        self.rotation = self.rotation @ rotation_by(self.rate_radps * dt_s)
+        self.rotation = middle @ half_turn
 
         transition = self._transition
         transition[0, 3] = transition[1, 4] = transition[2, 5] = dt_s
@@ -123,6 +117,13 @@ class ErrorStateFilter:
         diagonal[GYRO_BIAS] += noise.gyro_bias_walk_radps**2 * dt_s
         self.stamp_ns = stamp_ns
         self._remember()
+
+    def bridge(self, stamp_ns: int) -> None:
+        """Move on to just before a sample that comes after a gap, as if nothing had happened."""
+        gap_s = seconds(stamp_ns - self.stamp_ns) - _SAMPLE_S
+        self.loosen(GAP_MPS2 * gap_s, GAP_RADPS * gap_s)
+        hover = self.rotation.T @ (0.0, 0.0, GRAVITY_MPS2) + self.accel_bias_mps2
+        self.predict(stamp_ns - nanoseconds(_SAMPLE_S), self.gyro_bias_radps, hover)
 
     def at(self, stamp_ns: int) -> Snapshot | None:
         """The nominal pose at a stamp, from the last sample before it.
@@ -183,7 +184,7 @@ class ErrorStateFilter:
         covariance = self.covariance - gain @ cross.T
         self.covariance = 0.5 * (covariance + covariance.T)
 
-    def loosen(self, velocity_mps: float, rotation_rad: float) -> None:
+    def loosen(self, velocity_mps: float, rotation_rad: float = 0.0) -> None:
         """Know velocity and rotation less well, by these sigmas."""
         diagonal = np.einsum("ii->i", self.covariance)
         diagonal[VELOCITY] += velocity_mps**2
@@ -193,8 +194,7 @@ class ErrorStateFilter:
         turn = rotation_by(error[ROTATION])
         self.position_m += error[POSITION]
         self.velocity_mps += error[VELOCITY]
-        # Through scipy, the rotation stays one however often it is multiplied.
-        self.rotation = np.asarray(Rotation.from_matrix(turn @ self.rotation).as_matrix())
+        self.rotation = orthonormal(turn @ self.rotation)
         self.accel_bias_mps2 += error[ACCEL_BIAS]
         self.gyro_bias_radps += error[GYRO_BIAS]
         self.key_position_m += error[KEY_POSITION]

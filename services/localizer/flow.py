@@ -136,8 +136,9 @@ class Key:
             )
             found[seen] = there.reshape(-1, 2)
             # Found is not recognised: on a blank floor the search stops where it began.
-            alike = difference.reshape(-1) < MOST_DIFFERENCE * self._contrast[seen]
-            seen[seen] = alike & (status.reshape(-1) == 1)
+            tracked = status.reshape(-1) == 1
+            unlike = np.where(tracked, difference.reshape(-1), np.inf) / MOST_DIFFERENCE
+            seen[seen] = unlike < self._contrast[seen]
         return found, seen & _inside(found, picture)
 
 

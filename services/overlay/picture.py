@@ -16,6 +16,8 @@ TEXT: Colour = (245, 245, 245)
 EDGE: Colour = (20, 20, 20)
 RIM = 0.65
 """How far an arrow's rim is from its colour to white."""
+EDGED_PX = 7.0
+"""Lower arrows have no edges: little else would be left of them."""
 
 STRIP_PX = 24
 _SUBPIXEL_BITS = 4
@@ -34,10 +36,13 @@ def draw_arrow(picture: Picture, arrow: Arrow, colour: Colour) -> None:
     painted = region.copy()
     outline = np.round((arrow.outline_px - (x0, y0)) * (1 << _SUBPIXEL_BITS)).astype(np.int32)
     # Dark outside, light inside: one of the two shows on any ground.
-    cv2.polylines(painted, [outline], True, EDGE, 3, cv2.LINE_AA, _SUBPIXEL_BITS)
-    rim = tuple(round(part + RIM * (255 - part)) for part in colour)
+    is_edged = float(np.ptp(arrow.outline_px[:, 1])) >= EDGED_PX
+    if is_edged:
+        cv2.polylines(painted, [outline], True, EDGE, 3, cv2.LINE_AA, _SUBPIXEL_BITS)
     cv2.fillPoly(painted, [outline], colour, cv2.LINE_AA, _SUBPIXEL_BITS)
-    cv2.polylines(painted, [outline], True, rim, 1, cv2.LINE_AA, _SUBPIXEL_BITS)
+    if is_edged:
+        rim = tuple(round(part + RIM * (255 - part)) for part in colour)
+        cv2.polylines(painted, [outline], True, rim, 1, cv2.LINE_AA, _SUBPIXEL_BITS)
     cv2.addWeighted(painted, arrow.opacity, region, 1.0 - arrow.opacity, 0.0, region)
 
 

@@ -303,13 +303,14 @@ def test_started_in_flight_it_says_that_the_place_is_a_guess():
 # --- a new start -----------------------------------------------------------------------------
 
 
-def test_a_gap_of_the_imu_in_flight_is_bridged():
+@pytest.mark.parametrize("gap_s", [0.3, 1.5])
+def test_a_gap_of_all_sensors_in_flight_is_bridged(gap_s):
     def gap(topic, message, t_s):
-        return None if 2.0 < t_s < 2.6 else message
+        return None if 2.0 < t_s < 2.0 + gap_s else message
 
     flight = Flight(straight(0.6, 0.0), alter=gap, noises=NOISY)
-    pose, truth = flight.last(4.0)
-    assert pose.status == "ok"
+    pose, truth = flight.last(5.0)
+    assert pose.status == ("ok" if gap_s < 1.0 else "degraded")
     assert np.abs(place_error(pose, truth)).max() < 0.15
     assert np.abs(speed_error(pose, truth)).max() < 0.1
 

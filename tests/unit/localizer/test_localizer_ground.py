@@ -16,10 +16,10 @@ from services.localizer.filter import (
     POSITION,
     ROTATION,
     VELOCITY,
-    rotation_by,
 )
 from services.localizer.flow import Key, Picture
 from services.localizer.ground import View, displacement
+from services.localizer.rotation import rotation_by
 
 HEIGHT_M = 1.0
 PIXEL_M = HEIGHT_M / LENS.intrinsics[0]

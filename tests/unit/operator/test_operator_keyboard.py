@@ -1,10 +1,12 @@
 """Keys as sticks."""
 
+import pygame
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from common.config import ConfigError
+from services.operator import keyboard
 from services.operator.keyboard import AXES, DECISIONS, FULL, Keyboard, Keys
 from services.operator.sources import NEUTRAL
 
@@ -47,3 +49,27 @@ def test_without_a_screen_the_keyboard_is_refused_in_one_line(
         Keyboard()
     assert "needs a screen" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_the_window_takes_keys_until_they_are_released_or_it_loses_the_focus(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # SDL's dummy driver opens a window that nobody sees; its events are posted by hand.
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    monkeypatch.setattr(keyboard, "NO_SCREEN", set())
+    window = Keyboard()
+    try:
+        pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_w))
+        assert window.poll(0.1).sticks.vx > 0.3
+        assert window.poll(0.1).sticks.vx > 0.7
+        pygame.event.post(pygame.event.Event(pygame.KEYUP, key=pygame.K_w))
+        assert window.poll(0.1).sticks == NEUTRAL
+        pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_LEFT))
+        pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_RETURN))
+        reading = window.poll(0.1)
+        assert reading.sticks.wz > 0.3
+        assert reading.decisions == {"accept"}
+        pygame.event.post(pygame.event.Event(pygame.WINDOWFOCUSLOST))
+        assert window.poll(0.1).sticks == NEUTRAL
+    finally:
+        window.close()
