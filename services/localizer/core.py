@@ -52,6 +52,8 @@ FLYING_SPEED_SIGMA_MPS = 1.0
 COMPASS_CONTRADICTS_RAD = 0.35
 """At start, more than a person mis-aims and the compass is disturbed: 20 degrees."""
 COMPASS_GATE = 9.0
+COMPASS_REFUSALS = 20
+"""A compass that contradicts for a second is right: no disturbance flies along for so long."""
 FLOW_GATE = 13.8
 """Of the squared Mahalanobis length, two degrees of freedom: one good measurement in 1000."""
 FLOW_REFUSALS = 15
@@ -90,6 +92,7 @@ class Localizer:
         self._key: Key | None = None
         self._last_capture_ns: int | None = None
         self._flow_refused = 0
+        self._compass_refused = 0
         self._next_pose_ns = 0
         self._imu_arrival_ns: int | None = None
         self._altimeter_arrival_ns: int | None = None
@@ -259,7 +262,12 @@ class Localizer:
             residual = np.array([wrap_angle(yaw_error)])
             noise = np.array([[self._config.compass_noise_rad**2]])
             if state.surprise(residual, jacobian, noise) < COMPASS_GATE:
+                self._compass_refused = 0
                 state.correct(residual, jacobian, noise)
+            else:
+                self._compass_refused += 1
+                if self._compass_refused >= COMPASS_REFUSALS:
+                    state.loosen(0.0, abs(float(residual[0])))
         if self._standing:
             rate = self._rate_radps / self._batched
             jacobian = np.zeros((6, SIZE))

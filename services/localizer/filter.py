@@ -119,11 +119,12 @@ class ErrorStateFilter:
         self._remember()
 
     def bridge(self, stamp_ns: int) -> None:
-        """Move on to just before a sample that comes after a gap, as if nothing had happened."""
+        """Move on to just before a sample that comes after a gap, at the same speed and turn."""
         gap_s = seconds(stamp_ns - self.stamp_ns) - _SAMPLE_S
         self.loosen(GAP_MPS2 * gap_s, GAP_RADPS * gap_s)
         hover = self.rotation.T @ (0.0, 0.0, GRAVITY_MPS2) + self.accel_bias_mps2
-        self.predict(stamp_ns - nanoseconds(_SAMPLE_S), self.gyro_bias_radps, hover)
+        turn = self.gyro_bias_radps + np.array([0.0, 0.0, self.rate_radps[2]])
+        self.predict(stamp_ns - nanoseconds(_SAMPLE_S), turn, hover)
 
     def at(self, stamp_ns: int) -> Snapshot | None:
         """The nominal pose at a stamp, from the last sample before it.

@@ -17,15 +17,24 @@ from urllib.parse import urlsplit
 import msgspec
 from aiohttp import WSMsgType, web
 
-from common.clock import Clock
+from common.clock import Clock, seconds
 from services.overlay import protocol
 from services.overlay.lease import PadLease, Standing
 
 PAGE = Path(__file__).parent / "console" / "dist"
 PLAIN_PAGE = Path(__file__).parent / "console" / "plain.html"
 STATE_PERIOD_S = 0.1
+IN_FLIGHT = 3
+"""Pictures on their way to a page: with one alone, 60 ms of network would halve the rate."""
 SHOWN_TIMEOUT_S = 1.0
 """A page that does not say it has shown a picture gets the next one after this."""
+URGENT = ("emergency", "cancel")
+"""These never wait behind other decisions."""
+OPEN_DECISIONS = 2
+"""Other decisions that a page may have open."""
+DECISION_MAX_AGE_S = 0.2
+"""A button pressed longer ago than this, before the autopilot could be asked, means nothing now."""
+NO_ANSWER = "the autopilot does not answer"
 MAX_MESSAGE_BYTES = 4096
 START_TIMEOUT_S = 10.0
 
@@ -43,6 +52,8 @@ class Viewer:
         self.picture: bytes | None = None
         self.news = asyncio.Event()
         self.shown = asyncio.Event()
+        self.in_flight = 0
+        self.open_decisions = 0
 
     def offer(self, picture: bytes) -> None:
         """Have the newest picture sent next."""
@@ -84,7 +95,8 @@ class Console:
         self._stop: asyncio.Event | None = None
         self._started = threading.Event()
         self._error: OSError | None = None
-        self._workers = ThreadPoolExecutor(max_workers=4, thread_name_prefix="decide")
+        self._workers = ThreadPoolExecutor(max_workers=2, thread_name_prefix="decide")
+        self._urgent_workers = ThreadPoolExecutor(max_workers=2, thread_name_prefix="urgent")
         self._thread = threading.Thread(target=self._serve, name="console", daemon=True)
 
     def start(self) -> None:
@@ -108,7 +120,8 @@ class Console:
         if self._stop is not None and self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._stop.set)
             self._thread.join(START_TIMEOUT_S)
-        self._workers.shutdown(wait=False, cancel_futures=True)
+        for workers in (self._workers, self._urgent_workers):
+            workers.shutdown(wait=False, cancel_futures=True)
 
     # --- on the console's thread -----------------------------------------------------------------
 
@@ -157,7 +170,11 @@ class Console:
         origin = request.headers.get("Origin")
         if origin is not None and urlsplit(origin).netloc != request.host:
             raise web.HTTPForbidden(text="this socket is for the console's own page")
-        socket = web.WebSocketResponse(heartbeat=5.0, max_msg_size=MAX_MESSAGE_BYTES)
+        socket = web.WebSocketResponse(
+            heartbeat=5.0,
+            max_msg_size=MAX_MESSAGE_BYTES,
+            compress=False,  # JPEG does not get smaller, and trying costs 4 % of a core a viewer
+        )
         await socket.prepare(request)
         self._numbers += 1
         viewer = Viewer(self._numbers, socket)
@@ -170,6 +187,9 @@ class Console:
             async for message in socket:
                 if message.type is WSMsgType.TEXT:
                     await self._hear(viewer, message.data)
+                elif message.type is WSMsgType.BINARY:
+                    problem = protocol.Problem("only text messages are understood")
+                    await viewer.socket.send_str(protocol.encode(problem))
         finally:
             del self._viewers[viewer.number]
             self._lease.leave(viewer.number, self._clock.monotonic_ns())
@@ -184,10 +204,15 @@ class Console:
                 viewer.news.clear()
                 if viewer.picture is None:
                     continue
-                viewer.shown.clear()
+                while viewer.in_flight >= IN_FLIGHT:
+                    viewer.shown.clear()
+                    try:
+                        await asyncio.wait_for(viewer.shown.wait(), SHOWN_TIMEOUT_S)
+                    except TimeoutError:
+                        viewer.in_flight = 0
+                viewer.news.clear()
+                viewer.in_flight += 1
                 await viewer.socket.send_bytes(viewer.picture)
-                with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(viewer.shown.wait(), SHOWN_TIMEOUT_S)
 
     async def _send_state(self, viewer: Viewer) -> None:
         with contextlib.suppress(ConnectionError):
@@ -204,6 +229,7 @@ class Console:
             return
         match said:
             case protocol.Shown():
+                viewer.in_flight = max(0, viewer.in_flight - 1)
                 viewer.shown.set()
             case protocol.StickMoved(vx, vy, vz, wz):
                 self._lease.move(viewer.number, (vx, vy, vz, wz), self._clock.monotonic_ns())
@@ -215,8 +241,26 @@ class Console:
                 self._asked.add(task)
                 task.add_done_callback(self._asked.discard)
 
+    async def _answer_to(self, viewer: Viewer, decided: protocol.Decided) -> protocol.Answer:
+        if decided.action in URGENT:
+            return await self._loop.run_in_executor(self._urgent_workers, self._ask, decided)
+        refusal = protocol.Answer(decided.nonce, False, NO_ANSWER)
+        if viewer.open_decisions >= OPEN_DECISIONS:
+            return refusal
+        pressed_ns = self._clock.monotonic_ns()
+
+        def ask() -> protocol.Answer:
+            waited_s = seconds(self._clock.monotonic_ns() - pressed_ns)
+            return refusal if waited_s > DECISION_MAX_AGE_S else self._ask(decided)
+
+        viewer.open_decisions += 1
+        try:
+            return await self._loop.run_in_executor(self._workers, ask)
+        finally:
+            viewer.open_decisions -= 1
+
     async def _decide(self, viewer: Viewer, decided: protocol.Decided) -> None:
-        answer = await self._loop.run_in_executor(self._workers, self._ask, decided)
+        answer = await self._answer_to(viewer, decided)
         with contextlib.suppress(ConnectionError):
             await viewer.socket.send_str(protocol.encode(answer))
 

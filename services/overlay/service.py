@@ -67,7 +67,7 @@ def _console(node: Node, core: Overlay, config: Config) -> Console:
             )
 
     def state_of(pad: Standing) -> protocol.State:
-        return _state(node, core, sorted(alive), pad)
+        return _state(node, core, sorted(alive.copy()), pad)
 
     console = Console(config.console_host, config.console_port, state_of, ask, lease, node.clock)
     try:

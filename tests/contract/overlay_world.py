@@ -90,14 +90,21 @@ def on_path_px(ahead_m: float, below_m: float = 0.3, camera_m: float = 0.21) -> 
 
 
 class Page:
-    """A console page without a browser: shows pictures as they come and remembers the rest."""
+    """A console page without a browser: shows pictures as they come and remembers the rest.
 
-    def __init__(self, port: int, origin: str | None = None) -> None:
+    Args:
+        port: of the console.
+        origin: the site whose page it is.
+        shows: whether it says that it has shown a picture.
+    """
+
+    def __init__(self, port: int, origin: str | None = None, shows: bool = True) -> None:
         self.pictures: list[bytes] = []
         self.states: list[dict[str, Any]] = []
         self.answers: list[dict[str, Any]] = []
         self.arrival_s: list[float] = []
         self.refused = False
+        self._shows = shows
         self._url = f"http://127.0.0.1:{port}/ws"
         self._headers = {"Origin": origin} if origin else {}
         self._socket: aiohttp.ClientWebSocketResponse | None = None
@@ -120,7 +127,8 @@ class Page:
                 if message.type is aiohttp.WSMsgType.BINARY:
                     self.pictures.append(message.data)
                     self.arrival_s.append(time.monotonic())
-                    await socket.send_str('{"type":"shown"}')
+                    if self._shows:
+                        await socket.send_str('{"type":"shown"}')
                 elif message.type is aiohttp.WSMsgType.TEXT:
                     heard = json.loads(message.data)
                     (self.states if heard["type"] == "state" else self.answers).append(heard)

@@ -154,7 +154,7 @@ def test_on_the_mark_it_says_where_it_stands(service: Process, client: Client) -
     poses = client.collect("pose")
     vehicle = Vehicle(client)
     vehicle.say("landed")
-    vehicle.live(0.8)
+    vehicle.live(0.5)
     before = len(poses)
     vehicle.live(1.0)
     told = poses[before : poses.index(pose_of(client, vehicle)) + 1]
@@ -187,7 +187,7 @@ def test_in_flight_it_follows(
     """Forward is where the compass says."""
     vehicle = taken_off(client, yaw)
     vehicle.live(0.5, forward_mps2=1.0)
-    vehicle.live(1.0)
+    vehicle.live(0.7)
     pose = pose_of(client, vehicle)
     assert pose["status"] == "ok"
     assert yaw_of(pose) == pytest.approx(yaw, abs=0.05)
@@ -257,7 +257,7 @@ def test_a_picture_that_is_none_stops_nothing(
     vehicle = Vehicle(client)
     vehicle.silent.add("camera/down")
     vehicle.say("landed")
-    vehicle.live(0.8)
+    vehicle.live(0.6)
     assert pose_of(client, vehicle)["status"] == "ok"
 
 

@@ -119,7 +119,7 @@ class TestPictures:
         time.sleep(2.0)
         batch = list(shown)[begin:]
         assert len(batch) >= 0.9 * (len(world.captures) - sent)
-        assert len(batch) >= 50
+        assert len(batch) >= 45
         assert [m["seq"] for m in batch] == list(
             range(batch[0]["seq"], batch[0]["seq"] + len(batch))
         )
@@ -131,7 +131,7 @@ class TestPictures:
             arrived + utc_of_monotonic_s - capture / 1e9
             for arrived, capture in zip(shown.arrival_s[begin:], captures, strict=False)
         ]
-        assert np.median(ages_s) < 0.05
+        assert np.median(ages_s) < 0.1
 
     def test_no_path_without_a_pose_and_without_a_suggestion(self, client, world):
         def bare(image: dict[str, Any]) -> bool:
@@ -162,7 +162,7 @@ class TestPictures:
 
     def test_pictures_that_are_none_are_passed_over_and_told(self, client, overlay):
         before = client.next("health/overlay")["rejected"]
-        for more in ({"data": b"no picture"}, {"width": 9999}):
+        for more in ({"data": b"no picture"}, {"width": 65}):
             client.publish("camera/front", {**GOOD["Image"], **more})
             time.sleep(0.05)
         health = client.next("health/overlay", lambda h: "no JPEG" in h["detail"])
@@ -228,12 +228,12 @@ class TestConsole:
     def test_a_page_that_shows_nothing_gets_few_pictures_and_slows_nobody(
         self, world, page, console_port
     ):
-        frozen = Page(console_port)
+        frozen = Page(console_port, shows=False)
         try:
-            frozen.say('{"type":"shown"}')
             before = len(page.pictures)
             time.sleep(1.0)
             assert len(page.pictures) - before >= 20
+            assert 1 <= len(frozen.pictures) <= 6
         finally:
             frozen.leave()
 
@@ -284,6 +284,17 @@ class TestConsole:
         assert len(page.pictures) - before >= 20
         page.wait(lambda: bool(page.answers))
         assert page.answers[0]["ok"] is False
+
+    def test_emergency_never_waits_and_old_decisions_are_never_asked(self, page, decider):
+        decider.answers = False
+        for _ in range(6):
+            page.say({"type": "decide", "action": "accept", "nonce": next(nonces)})
+        page.say({"type": "decide", "action": "emergency", "nonce": next(nonces)})
+        page.wait(lambda: any(r["action"] == "emergency" for r in decider.requests), 1.0)
+        assert len([answer for answer in page.answers if not answer["ok"]]) >= 4
+        decider.answers = True
+        time.sleep(3.0)
+        assert len([r for r in decider.requests if r["action"] == "accept"]) <= 2
 
     def test_another_sites_page_is_not_let_in(self, overlay, console_port):
         assert Page(console_port, origin="http://elsewhere.example").refused

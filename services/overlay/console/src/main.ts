@@ -43,6 +43,12 @@ for (const action of ["accept", "cancel", "takeoff", "land", "emergency"] as con
   });
 }
 
+const stage = element("stage");
+element("picture").addEventListener("dblclick", () => {
+  if (document.fullscreenElement) void document.exitFullscreen();
+  else void stage.requestFullscreen();
+});
+
 const thumbs = new Thumbs(element("left-thumb"), element("right-thumb"));
 const hands = new Hands([new Pad(act), new Keyboard(act), thumbs], (message) =>
   connection.send(message),
