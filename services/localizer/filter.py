@@ -6,6 +6,7 @@ the left. One past pose, that of the key picture, is kept in the state ("stochas
 that a displacement against it corrects both ends and a hover does not drift.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -161,6 +162,11 @@ class ErrorStateFilter:
         with_clone = np.eye(SIZE)
         with_clone[15:21] = clone
         self.covariance = with_clone @ self.covariance @ with_clone.T
+
+    @property
+    def yaw_rad(self) -> float:
+        """The heading."""
+        return math.atan2(self.rotation[1, 0], self.rotation[0, 0])
 
     def age_s(self, stamp_ns: int) -> float:
         """How long ago a stamp was, on the time of the IMU."""

@@ -12,22 +12,14 @@ import pytest
 CONTRACT = Path(__file__).parents[1] / "contract"
 sys.path.append(str(CONTRACT))
 
-# The harness is that of the contract tests; both files are named conftest.
+# The harness and its fixtures are those of the contract tests. Both files are named conftest, so
+# whichever of the two `from conftest import` finds has all of it.
 _spec = importlib.util.spec_from_file_location("contract_harness", CONTRACT / "conftest.py")
 assert _spec is not None
 assert _spec.loader is not None
-harness = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(harness)
-
-Client, Launch, Process, Streams = (
-    harness.Client,
-    harness.Launch,
-    harness.Process,
-    harness.Streams,
-)
-free_port, start_service = harness.free_port, harness.start_service
-port, router, vehicle = harness.port, harness.router, harness.vehicle
-client, streams, launch = harness.client, harness.streams, harness.launch
+_harness = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(_harness)
+globals().update({k: v for k, v in vars(_harness).items() if not k.startswith("_")})
 
 CHROMIUM = shutil.which("chromium")
 FLAGS = (

@@ -361,6 +361,28 @@ def test_after_a_reset_it_begins_again_at_the_mark(how):
     assert all(abs(pose.position[0]) < 0.01 for pose in poses)
 
 
+@pytest.mark.parametrize("stamp_s", [0.0, 1.99, 500.0])
+def test_one_stray_sample_changes_nothing(stamp_s):
+    def stray(topic, message, t_s):
+        if topic == "imu" and abs(t_s - 2.0) < 1e-6:
+            return msgspec.structs.replace(message, stamp=nanoseconds(stamp_s))
+        return message
+
+    pose, truth = Flight(straight(1.0, 0.0), alter=stray).last(2.5)
+    assert np.abs(place_error(pose, truth)).max() < 0.02
+
+
+@pytest.mark.parametrize("field", ["angular_velocity", "linear_acceleration"])
+def test_a_sample_beyond_all_reason_is_left_out(field):
+    def mad(topic, message, t_s):
+        if topic == "imu" and abs(t_s - 2.0) < 1e-6:
+            return msgspec.structs.replace(message, **{field: (0.0, -1e300, 0.0)})
+        return message
+
+    pose, truth = Flight(straight(1.0, 0.0), alter=mad).last(2.5)
+    assert np.abs(place_error(pose, truth)).max() < 0.02
+
+
 def test_landing_is_no_reset():
     flight = Flight(straight(1.0, 0.0))
     before, _ = flight.last(2.5)
