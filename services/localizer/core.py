@@ -39,6 +39,8 @@ STRAYS = 5
 """Samples in a row whose stamps do not follow make a new start; fewer are left out."""
 MOST_RADPS, MOST_MPS2 = 100.0, 1000.0
 """An IMU that says more is broken: its sample counts as missing."""
+LAST_STAMP_NS = 2**62
+"""The year 2116; what is later does not fit the filter's memory."""
 SAMPLES_UNTOLD = 200
 """The samples of the start, if the vehicle does not say its state."""
 BATCH = 10
@@ -99,7 +101,11 @@ class Localizer:
     def on_imu(self, imu: Imu, now_ns: int) -> Pose | None:
         """Move on by one sample; the pose, when one is due."""
         rate, force = np.array(imu.angular_velocity), np.array(imu.linear_acceleration)
-        if np.abs(rate).max() > MOST_RADPS or np.abs(force).max() > MOST_MPS2:
+        if (
+            np.abs(rate).max() > MOST_RADPS
+            or np.abs(force).max() > MOST_MPS2
+            or not 0 <= imu.stamp < LAST_STAMP_NS
+        ):
             return None
         if self._filter is not None and not self._follows(self._filter, imu.stamp):
             return None
@@ -117,6 +123,9 @@ class Localizer:
         self._batched += 1
         if self._batched == BATCH:
             self._use_batch(state)
+        if not np.isfinite(state.position_m).all():
+            self._restart()  # each input was finite, but absurd
+            return None
         if imu.stamp < self._next_pose_ns:
             return None
         late = imu.stamp - self._next_pose_ns > self._pose_period_ns

@@ -190,6 +190,8 @@ class ErrorStateFilter:
         self._inject(gain @ residual)
         covariance = self.covariance - gain @ cross.T
         self.covariance = 0.5 * (covariance + covariance.T)
+        # Rounding may take a variance that is all but zero below it.
+        np.fill_diagonal(self.covariance, np.maximum(self.covariance.diagonal(), 0.0))
 
     def loosen(self, velocity_mps: float, rotation_rad: float = 0.0) -> None:
         """Know velocity and rotation less well, by these sigmas."""

@@ -4,6 +4,7 @@ Arrows are flat chevrons of fixed size in metres, so that perspective alone make
 the distance can be read from them; they fade towards the end of what is drawn.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,18 +42,38 @@ class Arrow:
     distance_m: float
 
 
-def ahead(suggestion: Suggestion, position_m: Array, length_m: float) -> Array:
-    """The path (N, 3) from its point nearest to the vehicle onward, at most `length_m` of it.
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """The part of a path that is drawn.
 
-    A closed path goes on from its end to its start.
+    Attributes:
+        points_m: (N, 3), from the point nearest to the vehicle onward.
+        first_m: where along it the first arrow begins.
+        spacing_m: from one arrow to the next.
+    """
+
+    points_m: Array
+    first_m: float
+    spacing_m: float
+
+
+def ahead(suggestion: Suggestion, position_m: Array, length_m: float) -> Stretch:
+    """The path from its point nearest to the vehicle onward, at most `length_m` of it.
+
+    A closed path goes on from its end to its start. Arrows stand at fixed places of the path, so
+    that they lie still in the world and the vehicle flies over them.
     """
     points_m = np.array([point[:3] for point in suggestion.path], dtype=np.float64)
     nearest = int(np.argmin(np.linalg.norm(points_m - position_m, axis=1)))
+    along_m = _along(points_m)
+    spacing_m, flown_m = SPACING_M, float(along_m[nearest])
     onward_m = points_m[nearest:]
     if suggestion.closed:
         onward_m = np.concatenate([onward_m, points_m[: nearest + 1]])
-    along_m = _along(onward_m)
-    return onward_m[along_m <= length_m]
+        # A whole number of arrows fits into a lap, so that none moves when one begins.
+        spacing_m = float(along_m[-1]) / max(1, round(float(along_m[-1]) / SPACING_M))
+    first_m = math.ceil((flown_m + FIRST_M) / spacing_m) * spacing_m - flown_m
+    return Stretch(onward_m[_along(onward_m) <= length_m], first_m, spacing_m)
 
 
 def _along(points_m: Array) -> Array:
@@ -60,10 +81,11 @@ def _along(points_m: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps_m)])
 
 
-def _chevrons(points_m: Array) -> tuple[Array, Array]:
-    """Corners (K, 4, 3) of flat arrows along a path (N, 3), and their distances (K,) along it."""
+def _chevrons(stretch: Stretch) -> tuple[Array, Array]:
+    """Corners (K, 4, 3) of flat arrows along a stretch, and their distances (K,) along it."""
+    points_m = stretch.points_m
     along_m = _along(points_m)
-    tails_m = np.arange(FIRST_M, along_m[-1] - LENGTH_M, SPACING_M)
+    tails_m = np.arange(stretch.first_m, along_m[-1] - LENGTH_M, stretch.spacing_m)
     if len(tails_m) == 0:
         return np.empty((0, 4, 3)), tails_m
 
@@ -101,10 +123,11 @@ def arrows_of(
         below_m: how far below the path the arrows lie.
     """
     position_m = np.asarray(pose.position, dtype=np.float64)
-    path_m = ahead(suggestion, position_m, length_m)
-    if len(path_m) < 2:
+    stretch = ahead(suggestion, position_m, length_m)
+    if len(stretch.points_m) < 2:
         return []
-    corners_m, distances_m = _chevrons(path_m - np.array([0.0, 0.0, below_m]))
+    corners_m, distances_m = _chevrons(stretch)
+    corners_m = corners_m - np.array([0.0, 0.0, below_m])
     rotation = rotation_of(pose.orientation)
     arrows: list[Arrow] = []
     for corners, distance_m in zip(corners_m[::-1], distances_m[::-1], strict=True):

@@ -383,6 +383,27 @@ def test_a_sample_beyond_all_reason_is_left_out(field):
     assert np.abs(place_error(pose, truth)).max() < 0.02
 
 
+def test_absurd_readings_stop_nothing():
+    """All of it is allowed by the contract; the pose stays a pose or is missing."""
+
+    def absurd(topic, message, t_s):
+        if topic == "altimeter" and t_s > 0.5:
+            return msgspec.structs.replace(message, range=1e300, max=1e301, stamp=-(10**18))
+        if topic == "camera/down" and t_s > 0.5:
+            lens = (1e-300, 1e300, 1e300, -1e300)
+            return msgspec.structs.replace(message, intrinsics=lens, distortion=(1e9,) * 4)
+        if topic == "imu" and t_s > 1.0:
+            return msgspec.structs.replace(
+                message, magnetic_field=(1e300, -1e300, 1e300), stamp=message.stamp + 2**63
+            )
+        return message
+
+    with np.errstate(all="ignore"):
+        poses = [pose for pose, _ in Flight(still(), alter=absurd).run(1.5)]
+    assert all(math.isfinite(value) for pose in poses for value in pose.position)
+    assert all(variance >= 0.0 for pose in poses for variance in pose.covariance)
+
+
 def test_landing_is_no_reset():
     flight = Flight(straight(1.0, 0.0))
     before, _ = flight.last(2.5)
