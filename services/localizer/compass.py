@@ -11,8 +11,8 @@ GATE = 9.0
 """Of the squared Mahalanobis length: three sigmas."""
 REFUSALS = 20
 """A compass that contradicts for a second is right: no disturbance flies along for so long."""
-_STEEPEST = 20.0
-"""A field whose vertical part is larger than this many horizontal ones has no direction."""
+_STEEPEST = 6.0
+"""A field that dips by more than 80 degrees says more of the tilt than of the heading."""
 
 
 def north_error(field: Array) -> float | None:

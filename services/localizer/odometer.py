@@ -75,6 +75,8 @@ class Odometer:
         offsets, _ = then.to_floor(key.rays)
         optical = now.of_floor(then.centre_m + offsets)
         ahead = optical[:, 2] > LEAST_HEIGHT_M / 4
+        if np.count_nonzero(ahead) < LEAST_POINTS:
+            return False, False
         expected = np.full((len(key.rays), 2), -1.0)
         expected[ahead] = picture.pixels(optical[ahead])
         found, ok = key.follow(picture, expected)

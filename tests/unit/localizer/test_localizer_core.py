@@ -390,7 +390,7 @@ def test_absurd_readings_stop_nothing():
         if topic == "altimeter" and t_s > 0.5:
             return msgspec.structs.replace(message, range=1e300, max=1e301, stamp=-(10**18))
         if topic == "camera/down" and t_s > 0.5:
-            lens = (1e-300, 1e300, 1e300, -1e300)
+            lens = (100.0, 100.0, 1e300, -1e300)
             return msgspec.structs.replace(message, intrinsics=lens, distortion=(1e9,) * 4)
         if topic == "imu" and t_s > 1.0:
             return msgspec.structs.replace(
@@ -423,6 +423,7 @@ def test_landing_is_no_reset():
         {"data": b"no picture"},
         {"width": 640, "height": 480},
         {"intrinsics": (0.0, 0.0, 160.0, 120.0)},
+        {"intrinsics": (1e-300, 1e300, 160.0, 120.0)},
     ],
 )
 def test_a_picture_that_is_none_is_refused(spoil):

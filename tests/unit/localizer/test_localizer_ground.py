@@ -1,5 +1,6 @@
 """The flow's geometry: signs, de-rotation, outliers, derivatives."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -111,19 +112,25 @@ small = st.floats(-0.15, 0.15)
 
 
 @settings(max_examples=30, deadline=None)
-@given(tilt=st.tuples(small, small, st.floats(-3.0, 3.0)), height=st.floats(0.3, 3.0))
-def test_rays_to_the_floor_agree_with_the_projection_of_the_cameras(tilt, height):
+@given(
+    tilt=st.tuples(small, small, st.floats(-3.0, 3.0)),
+    height=st.floats(0.3, 3.0),
+    distortion=st.sampled_from([(0.0,) * 4, (-0.3, 0.1, 0.001, -0.001)]),
+)
+def test_rays_to_the_floor_agree_with_the_projection_of_the_cameras(tilt, height, distortion):
+    lens = dataclasses.replace(LENS, distortion=distortion)
     position = np.array([1.0, -2.0, height])
     rotation = Rotation.from_euler("XYZ", tilt).as_matrix()
-    picture = Picture(image_of(np.zeros((LENS.height, LENS.width), np.uint8), 0))
+    picture = Picture(image_of(np.zeros((LENS.height, LENS.width), np.uint8), 0, lens))
     pixels = np.array([[20.0, 30.0], [160.0, 120.0], [300.0, 50.0]])
     view = View.of_body(position, rotation, 0.0)
     offsets, hits = view.to_floor(picture.rays(pixels))
     spots = view.centre_m + offsets
     assert hits.all()
     np.testing.assert_allclose(spots[:, 2], 0.0, atol=1e-9)
-    back, _ = project(to_optical(spots, position, rotation, DOWN), LENS)
+    back, _ = project(to_optical(spots, position, rotation, DOWN), lens)
     np.testing.assert_allclose(back, pixels, atol=1e-6)
+    np.testing.assert_allclose(picture.pixels(view.of_floor(spots)), pixels, atol=1e-6)
 
 
 @settings(max_examples=30, deadline=None)
