@@ -2,8 +2,8 @@
 
 import argparse
 import json
-import sys
 import threading
+from dataclasses import dataclass
 
 from rich.console import Console
 from rich.live import Live
@@ -12,13 +12,15 @@ from rich.table import Table
 import worlds
 from cli import launch
 from cli import options as opts
+from common import config
 from common.bus import Bus
 from common.clock import SystemClock, nanoseconds, sleep
 from common.messages import Health
 from common.node import Node
 from common.run import stop_on_signals
-from common.topics import SERVICES, alive_key_of
+from common.topics import alive_key_of
 from common.zenoh_bus import open_bus
+from services.operator.config import Config as OperatorConfig
 from studies.mission import Figures, MissionRecord
 
 WORLD = "track"
@@ -32,15 +34,23 @@ TRUTH_DEPTH = 256
 def declare(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("--once", action="store_true", help="end after one lap, print its figures")
-    parser.add_argument("--json", action="store_true", help="print the figures as one JSON object")
-    parser.add_argument("--seed", type=int, default=0, help="of the operator's hand and eyes (0)")
-    parser.add_argument("--record", action="store_true", help="also record to an MCAP file")
+    parser.add_argument("--json", action="store_true", help="with --once: as one JSON object")
+    parser.add_argument(
+        "--seed", metavar="N", type=opts.seed, help="of the operator's hand and eyes (1)"
+    )
     opts.add_local_system(parser)
     parser.epilog = (
         "Example: 'autocomplete demo', then open http://localhost:8080;"
         " 'autocomplete demo --once --json' for the figures of one lap."
     )
     parser.set_defaults(action=_run)
+
+
+@dataclass(frozen=True)
+class _Endless(OperatorConfig):
+    """An operator who flies on, unless a file or the environment says when to land."""
+
+    laps: int = 0
 
 
 class Observer:
@@ -75,10 +85,10 @@ class Observer:
         return self.operator_says.startswith(MISSION_DONE)
 
 
-def _status(observer: Observer, console_port: int) -> Table:
+def _status(observer: Observer, system: launch.System) -> Table:
     record = observer.record
     table = Table.grid(padding=(0, 2))
-    table.add_row("console", f"http://localhost:{console_port}")
+    table.add_row("console", system.console)
     table.add_row("services", f"{len(observer.alive)} alive: {', '.join(sorted(observer.alive))}")
     table.add_row("mode", record.mode)
     table.add_row("laps", f"{record.laps:.2f}")
@@ -90,7 +100,11 @@ def _status(observer: Observer, console_port: int) -> Table:
 
 
 def _fly(observer: Observer, system: launch.System, stop: threading.Event, once: bool) -> bool:
-    """Watch until the mission is done, time runs out or `stop`; whether it was done."""
+    """Watch until the mission is done or `stop` is set; whether it was done.
+
+    Raises:
+        SystemFailedError: if a process ends, or time runs out.
+    """
     clock = SystemClock()
     deadline_ns = clock.monotonic_ns() + nanoseconds(MISSION_TIMEOUT_S)
     while not stop.is_set():
@@ -99,59 +113,64 @@ def _fly(observer: Observer, system: launch.System, stop: threading.Event, once:
         if once and observer.done:
             return True
         if once and clock.monotonic_ns() > deadline_ns:
-            return False
+            raise launch.SystemFailedError(
+                f"the mission did not end within {MISSION_TIMEOUT_S:.0f} s:"
+                f" {observer.operator_says} ({system.logs})"
+            )
         sleep(0.02)
     return False
 
 
 def _run(options: argparse.Namespace) -> int:
+    if options.json and not options.once:
+        raise ValueError("--json: the figures are those of one lap; add --once")
     stop = stop_on_signals()
-    console = Console(stderr=True)
-    services = [name for name in SERVICES if name != "recorder" or options.record]
+    endless = config.load(_Endless, "operator", options.config)
     settings = {
         "sim": {"world": WORLD},
-        "overlay": {"console_port": str(options.console_port)},
         "operator": {
             "source": "scripted",
-            "laps": "1" if options.once else "0",
-            "seed": str(options.seed),
+            "world": WORLD,
+            "laps": 1 if options.once else endless.laps,
+            "seed": options.seed,
         },
     }
-    opts.require_free_console_port(options.console_port)
+    with launch.running_as_asked(options, settings) as system:
+        bus = open_bus(stop, system.endpoint)
+        figures = None if bus is None else _observe(bus, system, stop, options.once)
+        if not options.once:
+            return 0
+        if figures is None:
+            raise launch.SystemFailedError(f"interrupted before the lap's end ({system.logs})")
+        _print_figures(figures, options.json)
+        if figures.laps < 1:
+            raise launch.SystemFailedError(f"no whole lap was flown ({system.logs})")
+    return 0
+
+
+def _observe(bus: Bus, system: launch.System, stop: threading.Event, once: bool) -> Figures | None:
+    """A mission's figures once it is done, or None if `stop` is set first.
+
+    Raises:
+        SystemFailedError: if a process ends, or time runs out.
+    """
+    console = Console(stderr=True)
+    observer = Observer(bus, system.vehicle)
     try:
-        with launch.running(services, settings, options.vehicle, options.config) as system:
-            bus = open_bus(stop, system.endpoint)
-            if bus is None:
-                return 0
-            observer = Observer(bus, options.vehicle)
-            try:
-                with console.status("starting the services"):
-                    launch.wait_alive(system, observer.alive, services, stop, START_TIMEOUT_S)
-                with Live(
-                    get_renderable=lambda: _status(observer, options.console_port),
-                    console=console,
-                    refresh_per_second=4,
-                    transient=True,
-                ):
-                    done = _fly(observer, system, stop, options.once)
-            finally:
-                observer.node.close()
-    except launch.SystemFailedError as error:
-        sys.stderr.write(f"autocomplete demo: {error}\n")
-        return 1
-    if not options.once:
-        return 0
-    figures = observer.record.figures()
-    _print_figures(figures, options.json, console)
-    if not done:
-        sys.stderr.write(
-            f"autocomplete demo: the mission did not end within {MISSION_TIMEOUT_S:.0f} s:"
-            f" {observer.operator_says} (logs in {system.logs})\n"
-        )
-    return 0 if done and figures.laps >= 1 else 1
+        with console.status("starting the services"):
+            launch.wait_alive(system, observer.alive, list(system.configs), stop, START_TIMEOUT_S)
+        with Live(
+            get_renderable=lambda: _status(observer, system),
+            console=console,
+            refresh_per_second=4,
+            transient=True,
+        ):
+            return observer.record.figures() if _fly(observer, system, stop, once) else None
+    finally:
+        observer.node.close()
 
 
-def _print_figures(figures: Figures, as_json: bool, console: Console) -> None:
+def _print_figures(figures: Figures, as_json: bool) -> None:
     if as_json:
         print(json.dumps(figures.as_dict()))
         return

@@ -20,7 +20,9 @@ from cli import launch
 from cli import options as opts
 from cli.link import linked
 from common.clock import sleep
+from common.network import ROUTER_PORT
 from common.topics import SERVICES, alive_key_of
+from services.overlay.config import Config as OverlayConfig
 
 State = Literal["ok", "warn", "fail"]
 OLDEST_PYTHON = (3, 11)
@@ -177,9 +179,9 @@ def _port(number: int, use: str, mend: str) -> Finding:
 
 
 def _ports() -> Iterator[Finding]:
-    yield _port(launch.ROUTER_PORT, "a router", "right if a router runs here already")
+    yield _port(ROUTER_PORT, "a router", "right if a router runs here already")
     yield _port(
-        launch.CONSOLE_PORT,
+        OverlayConfig.console_port,
         "the console",
         "right if the console runs here already; else demo --console-port 8090",
     )

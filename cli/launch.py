@@ -1,7 +1,10 @@
 """A whole system on this machine: a router and the services, each a process of its own."""
 
+import argparse
 import contextlib
+import json
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -10,18 +13,23 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+from common import config
 from common.clock import SystemClock, nanoseconds, sleep
-from common.topics import DEFAULT_VEHICLE
+from common.network import ROUTER_PORT
+from common.run import ENDS_WITH_STDIN, config_type_of
+from common.topics import DEFAULT_VEHICLE, SERVICES
 
-ROUTER_PORT = 7447
-CONSOLE_PORT = 8080
 STOP_TIMEOUT_S = 6.0
-LOG_TAIL_LINES = 8
 
 
-class SystemFailedError(Exception):
-    """A process of the system ended by itself; the text says which, and the end of its log."""
+Settings = Mapping[str, Mapping[str, Any]]
+"""Configuration by service and field, over that of a file; None leaves a field to it."""
+
+
+class SystemFailedError(OSError):
+    """The system did not do its work; one line, with where its logs are."""
 
 
 def is_free(port: int) -> bool:
@@ -49,12 +57,14 @@ class System:
     Attributes:
         endpoint: where its router listens.
         vehicle: the vehicle's name.
-        logs: a folder with one log a process.
+        logs: a folder with one log a process; removed on a clean end.
+        configs: what its services run with, by service.
     """
 
     endpoint: str
     vehicle: str
     logs: Path
+    configs: Mapping[str, Any]
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
     def start(self, name: str, *arguments: str) -> None:
@@ -62,19 +72,35 @@ class System:
         with (self.logs / f"{name}.log").open("wb") as sink:
             self.processes[name] = subprocess.Popen(
                 [sys.executable, "-m", "cli.main", *arguments],
-                stdin=subprocess.DEVNULL,
+                # Never written to: it closes when this process ends, and its reader ends too.
+                stdin=subprocess.PIPE,
                 stdout=sink,
                 stderr=subprocess.STDOUT,
                 # Ctrl-C reaches this process alone, which then stops the others in order.
                 start_new_session=True,
-                env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+                env={
+                    **os.environ,
+                    ENDS_WITH_STDIN: "1",
+                    "OMP_NUM_THREADS": "1",
+                    "OPENBLAS_NUM_THREADS": "1",
+                },
             )
 
-    def start_service(self, service: str, settings: Mapping[str, str], *more: str) -> None:
+    def start_service(self, service: str, settings: Mapping[str, Any], *more: str) -> None:
         """Start a service of this system with some of its configuration set."""
-        flags = [f"--{name.replace('_', '-')}={value}" for name, value in settings.items()]
+        flags = [
+            f"--{name.replace('_', '-')}={value}"
+            for name, value in settings.items()
+            if value is not None
+        ]
         where = ["--vehicle", self.vehicle, "--connect", self.endpoint]
         self.start(service, "run", service, *where, *flags, *more)
+
+    @property
+    def console(self) -> str:
+        """Where the console's page is."""
+        port = self.configs["overlay"].console_port
+        return f"http://localhost:{port}" if port else "switched off"
 
     def check(self) -> None:
         """See that every process runs.
@@ -86,10 +112,8 @@ class System:
             code = process.poll()
             if code is not None:
                 log = self.logs / f"{name}.log"
-                tail = log.read_text(errors="replace").splitlines()[-LOG_TAIL_LINES:]
-                raise SystemFailedError(
-                    "\n".join([f"{name} ended with code {code} ({log})", *tail])
-                )
+                said = last_words(log.read_text(errors="replace"))
+                raise SystemFailedError(f"{name} ended with code {code}: {said} ({log})")
 
     def stop(self) -> None:
         """Stop every process, the router last; kill what does not stop in time."""
@@ -107,26 +131,54 @@ class System:
             if process.poll() is None:
                 process.kill()
                 process.wait()
+            if process.stdin is not None:
+                process.stdin.close()
+
+
+def last_words(log: str) -> str:
+    """What the last line of a process' log says to a person."""
+    line = next((line.strip() for line in reversed(log.splitlines()) if line.strip()), "no word")
+    try:
+        entry = json.loads(line)
+        fault = entry.get("exception", "").splitlines()[-1:]
+        return ": ".join([entry["message"], *fault])
+    except (ValueError, TypeError, KeyError, AttributeError):
+        return line.removeprefix("autocomplete run: ")
 
 
 @contextlib.contextmanager
 def running(
     services: Sequence[str],
-    settings: Mapping[str, Mapping[str, str]],
+    settings: Settings,
     vehicle: str = DEFAULT_VEHICLE,
     config_file: Path | None = None,
 ) -> Iterator[System]:
-    """A router and services, stopped on leaving.
+    """A router and services, stopped on leaving; their logs stay if one leaves by an exception.
 
     Args:
         services: which services to start.
         settings: configuration by service and field, over that of the file.
         vehicle: the vehicle's name.
         config_file: a TOML file with a table a service.
+
+    Raises:
+        ConfigError: if a service's configuration cannot be used; nothing was started.
+        ValueError: if the console's port is taken.
     """
+    configs = {
+        service: config.load(
+            config_type_of(service), service, config_file, flags=settings.get(service)
+        )
+        for service in services
+    }
+    console_port = configs["overlay"].console_port if "overlay" in configs else 0
+    if console_port and not is_free(console_port):
+        raise ValueError(
+            f"--console-port: port {console_port} is taken; name another, for example 8090"
+        )
     port = ROUTER_PORT if is_free(ROUTER_PORT) else free_port()
     logs = Path(tempfile.mkdtemp(prefix="autocomplete-"))
-    system = System(f"tcp/127.0.0.1:{port}", vehicle, logs)
+    system = System(f"tcp/127.0.0.1:{port}", vehicle, logs, configs)
     more = ["--config", str(config_file)] if config_file else []
     try:
         system.start("router", "router", "--listen", system.endpoint)
@@ -135,6 +187,19 @@ def running(
         yield system
     finally:
         system.stop()
+    shutil.rmtree(logs, ignore_errors=True)
+
+
+def running_as_asked(
+    options: argparse.Namespace, settings: Settings
+) -> contextlib.AbstractContextManager[System]:
+    """All services as the options of `cli.options.add_local_system` ask for them."""
+    return running(
+        [name for name in SERVICES if name != "recorder" or options.record],
+        {"overlay": {"console_port": options.console_port}, **settings},
+        options.vehicle,
+        options.config,
+    )
 
 
 def wait_alive(

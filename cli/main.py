@@ -23,6 +23,9 @@ COMMANDS = {
     "train": "make the model that recognises primitives, and its card",
 }
 
+DEBUG = "AUTOCOMPLETE_DEBUG"
+"""Set to 1, an error is shown with its traceback."""
+
 
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line that points to the help.
@@ -42,6 +45,25 @@ class Parser(argparse.ArgumentParser):
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
+    try:
+        return _run(arguments)
+    except BrokenPipeError:
+        # The reader of a pipe has left; nothing is to be flushed to it at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        return 0
+    except Exception as error:
+        if os.environ.get(DEBUG):
+            raise
+        text = next(iter(str(error).splitlines()), "")
+        if not isinstance(error, ValueError | OSError):
+            text = f"{type(error).__name__}: {text} ({DEBUG}=1 shows where)"
+        sys.stderr.write(f"autocomplete {arguments[0]}: {text}\n")
+        return 2 if isinstance(error, ValueError) else 1
+
+
+def _run(arguments: list[str]) -> int:
     parser = Parser(
         prog="autocomplete",
         description="Start a motion with the sticks; the drone recognises it, draws it, flies it.",
@@ -55,17 +77,7 @@ def main(arguments: list[str] | None = None) -> int:
             # Only the command that runs is imported: a service starts no faster than its imports.
             importlib.import_module(f"cli.{name}").declare(command)
     options = parser.parse_args(arguments)
-    try:
-        return int(options.action(options))
-    except BrokenPipeError:
-        # The reader of a pipe has left; nothing is to be flushed to it at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except (ValueError, OSError) as error:
-        sys.stderr.write(f"autocomplete {options.command}: {error}\n")
-        return 2 if isinstance(error, ValueError) else 1
-    except KeyboardInterrupt:
-        return 0
+    return int(options.action(options))
 
 
 if __name__ == "__main__":

@@ -6,10 +6,8 @@ import os
 import re
 from pathlib import Path
 
-from cli import launch
+from common.network import DEFAULT_ENDPOINT, ENDPOINT_PATTERN
 from common.topics import DEFAULT_VEHICLE, VEHICLE_PATTERN
-
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 
 def vehicle(text: str) -> str:
@@ -46,6 +44,41 @@ def positive(text: str) -> int:
     return int(text)
 
 
+def port(text: str) -> int:
+    """A TCP port.
+
+    Raises:
+        argparse.ArgumentTypeError: if it is not one.
+    """
+    if not text.isdecimal() or not 1 <= int(text) <= 65535:
+        raise argparse.ArgumentTypeError(f"{text!r}: use a port, 1 to 65535")
+    return int(text)
+
+
+def seed(text: str) -> int:
+    """What noise is drawn from.
+
+    Raises:
+        argparse.ArgumentTypeError: if it is not a whole number from 0.
+    """
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r}: use a whole number from 0")
+    return int(text)
+
+
+def endpoint(text: str) -> str:
+    """An endpoint of Zenoh.
+
+    Raises:
+        argparse.ArgumentTypeError: if it is not one.
+    """
+    if not ENDPOINT_PATTERN.fullmatch(text):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no endpoint; write for example {DEFAULT_ENDPOINT}"
+        )
+    return text
+
+
 def duration(text: str) -> float:
     """A time in s, more than none.
 
@@ -78,6 +111,7 @@ def add_network(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--connect",
         metavar="ENDPOINT",
+        type=endpoint,
         default=os.environ.get("AUTOCOMPLETE_CONNECT") or DEFAULT_ENDPOINT,
         help=f"the router's endpoint ($AUTOCOMPLETE_CONNECT or {DEFAULT_ENDPOINT})",
     )
@@ -95,18 +129,9 @@ def add_local_system(parser: argparse.ArgumentParser) -> None:
         "--vehicle", type=vehicle, default=DEFAULT_VEHICLE, help="its name in every key (drone0)"
     )
     parser.add_argument(
-        "--console-port", type=int, default=launch.CONSOLE_PORT, help="of the console's page (8080)"
+        "--console-port", metavar="PORT", type=port, help="of the console's page (8080)"
     )
+    parser.add_argument("--record", action="store_true", help="also record to an MCAP file")
     parser.add_argument(
         "--config", metavar="FILE", type=existing_file, help="TOML with a table a service"
     )
-
-
-def require_free_console_port(port: int) -> None:
-    """See that the console can listen.
-
-    Raises:
-        ValueError: if somebody listens on `port` already.
-    """
-    if not launch.is_free(port):
-        raise ValueError(f"--console-port: port {port} is taken; name another, for example 8090")

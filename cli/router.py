@@ -1,10 +1,12 @@
 """`autocomplete router`: an embedded Zenoh router."""
 
 import argparse
+import json
 
 import zenoh
 
 from cli import options as opts
+from common.network import ROUTER_PORT
 from common.run import stop_on_signals
 from common.zenoh_bus import router_config
 
@@ -17,8 +19,9 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--listen",
         metavar="ENDPOINT",
-        default="tcp/[::]:7447",
-        help="where to listen (tcp/[::]:7447); a file's own endpoints come first",
+        type=opts.endpoint,
+        default=f"tcp/[::]:{ROUTER_PORT}",
+        help=f"where to listen (tcp/[::]:{ROUTER_PORT}); a file's own endpoints come first",
     )
     opts.add_examples(
         parser,
@@ -31,13 +34,16 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     stop = stop_on_signals()
+    config = router_config(options.listen, options.config)
     try:
-        session = zenoh.open(router_config(options.listen, options.config))
+        session = zenoh.open(config)
     except zenoh.ZError as error:
         reason = str(error).split(" at /", 1)[0]
-        raise OSError(
-            f"cannot listen on {options.listen}: {reason}; name another with --listen"
-        ) from None
+        endpoints = json.loads(config.get_json("listen/endpoints"))
+        listen, mend = f"the endpoints of {options.config}", "there"
+        if endpoints == [options.listen]:
+            listen, mend = options.listen, "with --listen"
+        raise OSError(f"cannot listen on {listen}: {reason}; name another {mend}") from None
     with session:
         stop.wait()
     return 0

@@ -17,6 +17,8 @@ from rich.progress import (
 )
 from rich.table import Table
 
+from cli import options as opts
+
 if TYPE_CHECKING:
     from training.fit import Epoch
     from training.train import Judged, Run
@@ -32,7 +34,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         default="shipped",
         help="how much to train on: shipped (about 10 minutes) or quick (under one minute)",
     )
-    parser.add_argument("--seed", type=_seed, default=0, help="same seed, same model (0)")
+    parser.add_argument("--seed", type=opts.seed, default=0, help="same seed, same model (0)")
     parser.add_argument(
         "--out",
         metavar="FOLDER",
@@ -41,13 +43,6 @@ def declare(parser: argparse.ArgumentParser) -> None:
         help="where intent.onnx, its card README.md and its figures go (models/)",
     )
     parser.set_defaults(action=_run)
-
-
-def _seed(text: str) -> int:
-    seed = int(text)
-    if seed < 0:
-        raise argparse.ArgumentTypeError("a seed is 0 or more")
-    return seed
 
 
 class _Bars:

@@ -1,24 +1,32 @@
 """`autocomplete up`: all services on this machine, for a person at the console or a pad."""
 
 import argparse
-import sys
+from typing import get_args
 
 from rich.console import Console
 
+import worlds
 from cli import launch
 from cli import options as opts
 from common.clock import sleep
 from common.run import stop_on_signals
-from common.topics import SERVICES
+from services.operator.config import Source
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("--world", default="track", help="where to fly (track)")
     parser.add_argument(
-        "--source", default="auto", help="auto, pad, keyboard or console: whose sticks fly (auto)"
+        "--world",
+        metavar="WORLD",
+        choices=worlds.names(),
+        help=f"where to fly: {', '.join(worlds.names())} (track)",
     )
-    parser.add_argument("--record", action="store_true", help="also record to an MCAP file")
+    parser.add_argument(
+        "--source",
+        metavar="SOURCE",
+        choices=get_args(Source),
+        help=f"whose sticks fly: {', '.join(get_args(Source))} (auto)",
+    )
     opts.add_local_system(parser)
     parser.epilog = "Then open http://localhost:8080, press 'take off', and fly."
     parser.set_defaults(action=_run)
@@ -26,24 +34,17 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     stop = stop_on_signals()
-    services = [name for name in SERVICES if name != "recorder" or options.record]
     settings = {
         "sim": {"world": options.world},
-        "overlay": {"console_port": str(options.console_port)},
-        "operator": {"source": options.source},
+        "operator": {"source": options.source, "world": options.world},
     }
-    opts.require_free_console_port(options.console_port)
-    try:
-        with launch.running(services, settings, options.vehicle, options.config) as system:
-            console = Console(stderr=True)
-            console.print(f"console  http://localhost:{options.console_port}")
-            console.print(f"router   {system.endpoint}")
-            console.print(f"logs     {system.logs}")
-            console.print("Ctrl-C stops everything.")
-            while not stop.is_set():
-                system.check()
-                sleep(0.2)
-    except launch.SystemFailedError as error:
-        sys.stderr.write(f"autocomplete up: {error}\n")
-        return 1
+    with launch.running_as_asked(options, settings) as system:
+        console = Console(stderr=True)
+        console.print(f"console  {system.console}")
+        console.print(f"router   {system.endpoint}")
+        console.print(f"logs     {system.logs}")
+        console.print("Ctrl-C stops everything.")
+        while not stop.is_set():
+            system.check()
+            sleep(0.2)
     return 0

@@ -12,7 +12,9 @@ from msgspec import Meta
 
 from common import CONTRACT_VERSION
 
-Stamp = Annotated[int, Meta(description="ns on the clock of the session")]
+Stamp = Annotated[
+    int, Meta(ge=-(2**63), le=2**63 - 1, description="ns on the clock of the session")
+]
 Seq = Annotated[int, Meta(ge=0)]
 Count = Annotated[int, Meta(ge=0)]
 Fraction = Annotated[float, Meta(ge=-1.0, le=1.0)]
@@ -26,6 +28,8 @@ PathPoint = Annotated[
 ]
 
 NONE_LABEL = "none"
+PRIMITIVES = ("line", "arc", "sine", "helix")
+"""Those that every model knows; it may know more."""
 PROBABILITY_SUM_TOLERANCE = 1e-3
 QUATERNION_NORM_TOLERANCE = 1e-2
 
@@ -92,6 +96,9 @@ class Intent(Message, frozen=True, kw_only=True):
         total = sum(self.probabilities.values())
         if abs(total - 1.0) > PROBABILITY_SUM_TOLERANCE:
             raise ValueError(f"probabilities sum to {total:.4f}, not 1")
+        missing = [name for name in PRIMITIVES if name not in self.probabilities]
+        if missing:
+            raise ValueError(f"probabilities lack {', '.join(missing)}")
         if self.label != NONE_LABEL and self.label not in self.probabilities:
             raise ValueError(f"label {self.label!r} is not among the probabilities")
         if self.window_end < self.window_start:

@@ -94,6 +94,7 @@ class Node:
         self._warn = RateLimited(log, self.clock)
         self._health_of_core: Callable[[], tuple[m.HealthState, str]] = lambda: ("ok", "")
         self._health_since_ns = self.clock.monotonic_ns()
+        self._faults = 0
 
     # --- what a service declares -----------------------------------------------------------------
 
@@ -260,7 +261,15 @@ class Node:
             subscription.rejected += 1
             self._warn.warning(f"{topic.name}: invalid payload dropped: {error}")
             return
-        subscription.handler(message, arrival_ns)
+        if topic.delivery is Delivery.COMMAND:
+            # A process that stood still must not act on what was meant for the time before.
+            age_s = seconds(self.clock.monotonic_ns() - arrival_ns)
+            if age_s > topic.max_age_s:
+                return
+        try:
+            subscription.handler(message, arrival_ns)
+        except Exception as error:
+            self._fault(topic.name, error)
 
     def _answer(self, server: _Server, request: Request) -> None:
         try:
@@ -272,8 +281,18 @@ class Node:
         except RefusedError as error:
             refusal = m.QueryError(error=str(error), field=error.field_name)
             request.refuse(m.encode(refusal), m.encoding_of(m.QueryError))
+        except Exception as error:
+            self._fault(server.query.name, error)
+            refusal = m.QueryError(error=f"{self.service} could not handle this: {error}")
+            request.refuse(m.encode(refusal), m.encoding_of(m.QueryError))
         else:
             request.reply(m.encode(reply), m.encoding_of(server.query.reply))
+
+    def _fault(self, name: str, error: Exception) -> None:
+        """A message that was valid has hit a fault of ours: say so, and go on without it."""
+        self._faults += 1
+        log.debug("handling %s", name, exc_info=error)
+        self._warn.warning(f"fault in {name}: {type(error).__name__}: {error}")
 
     def _timed(self, handler: Handler) -> Handler:
         def timed(message: Any, arrival_ns: int) -> None:
@@ -298,6 +317,9 @@ class Node:
             rates[name] = subscription.received / elapsed_s
             subscription.received = 0
         state, detail = self._health_of_core()
+        if self._faults:
+            state = "failed" if state == "failed" else "degraded"
+            detail = f"{detail}; {self._faults} messages could not be handled".removeprefix("; ")
         p50, p99 = _percentiles(self._latencies_s)
         self.publish(
             f"health/{self.service}",

@@ -3,8 +3,8 @@
 import gc
 import importlib
 import logging
+import os
 import signal
-import sys
 import threading
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,9 +12,13 @@ from types import FrameType
 from typing import Any
 
 from common import config, log
+from common.network import DEFAULT_ENDPOINT
 from common.node import Node
 from common.topics import DEFAULT_VEHICLE, key_of
-from common.zenoh_bus import DEFAULT_ENDPOINT, open_bus
+from common.zenoh_bus import open_bus
+
+ENDS_WITH_STDIN = "AUTOCOMPLETE_ENDS_WITH_STDIN"
+"""Set for a process whose stdin is a pipe from the one that started it: it ends when that does."""
 
 _logger = logging.getLogger(__name__)
 
@@ -26,7 +30,7 @@ def config_type_of(service: str) -> type[Any]:
 
 
 def stop_on_signals() -> threading.Event:
-    """An event that SIGTERM and SIGINT set."""
+    """An event that SIGTERM, SIGINT and SIGHUP set, and the end of a starter that asked for it."""
     stop = threading.Event()
 
     def request_stop(_signal: int, _frame: FrameType | None) -> None:
@@ -34,7 +38,20 @@ def stop_on_signals() -> threading.Event:
 
     signal.signal(signal.SIGTERM, request_stop)
     signal.signal(signal.SIGINT, request_stop)
+    # Under nohup a closed terminal is to be survived.
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, request_stop)
+    if os.environ.get(ENDS_WITH_STDIN):
+        threading.Thread(target=_await_end_of_stdin, args=(stop,), daemon=True).start()
     return stop
+
+
+def _await_end_of_stdin(stop: threading.Event) -> None:
+    # The kernel closes the pipe however the starter ends, by SIGKILL too. Not through sys.stdin:
+    # its lock, held by a waiting thread, aborts the interpreter's own end.
+    while os.read(0, 1024):
+        pass
+    stop.set()
 
 
 def run_service(
@@ -45,11 +62,12 @@ def run_service(
     zenoh_config_file: Path | None = None,
     flags: Mapping[str, Any] | None = None,
 ) -> int:
-    """Run a service until SIGTERM or SIGINT; returns its exit code.
+    """Run a service until it is to stop; returns its exit code.
 
     Raises:
         ConfigError: if the configuration cannot be used.
         ValueError: if the vehicle's name or the endpoint cannot be used.
+        OSError: if this machine lacks what the configuration asks for.
     """
     key_of(vehicle, service)
     settings = config.load(config_type_of(service), service, config_file, flags=flags)
@@ -67,8 +85,8 @@ def run_service(
         _logger.info("%s is up", service)
         return _serve(node, stop)
     except config.ConfigError as error:
-        sys.stderr.write(f"{error}\n")
-        return 1
+        # Well-formed, so it is no wrong usage: wire() found no such device, model or world here.
+        raise OSError(str(error)) from None
     finally:
         node.close()
 

@@ -21,7 +21,8 @@ class FullStick:
 FULL_STICK: dict[str, FullStick] = {
     # tum_simulator a020d89: velocity_x, velocity_y 1 m/s, velocity_z 0.5 m/s, yaw 1 rad/s.
     "tum": FullStick(1.0, 1.0, 0.5, 1.0),
-    # tum_ardrone 6bcfb34, c1..c8: 12 deg of tilt at half stick give c2 * 12 deg... see plants.
+    # tum_ardrone 6bcfb34, c1..c8: tilt saturates at 12 deg, which gives c2 sin(12 deg) = 3.6 m/s;
+    # climb c8 = 0.6 m/s; yaw c6 = 90 deg/s.
     "ardrone": FullStick(3.66, 3.66, 0.6, 1.571),
 }
 

@@ -1,7 +1,7 @@
 """The one table of topics and queries.
 
-Publishers, subscribers, the router's access control, the recorder's list, the docs page and the
-contract tests are derived from it.
+Publishers, subscribers, the recorder's list, `autocomplete topics` and the contract's page are
+derived from it.
 """
 
 import re

@@ -2,7 +2,6 @@
 
 import json
 import logging
-import re
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -12,9 +11,9 @@ from typing import Any
 import zenoh
 
 from common.bus import AliveCallback, PayloadCallback, QueryFailedError, Request
+from common.network import DEFAULT_ENDPOINT, ENDPOINT_PATTERN
 from common.topics import Delivery
 
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 LEASE_MS = 1000
 """A frozen process shows after one lease; at Zenoh's default of 10 s it takes 9.5 s."""
 
@@ -42,14 +41,24 @@ _VIDEO_QOS: dict[str, Any] = {
     "congestion_control": zenoh.CongestionControl.DROP,
 }
 
-_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws|unixsock-stream|serial)/\S+")
-
 log = logging.getLogger(__name__)
 
 
 def _base_config(file: Path | None) -> zenoh.Config:
-    config: zenoh.Config = zenoh.Config.from_file(str(file)) if file else zenoh.Config()
-    return config
+    """Zenoh's defaults, or those of a file.
+
+    Raises:
+        ValueError: if the file is none of Zenoh's.
+    """
+    if file is None:
+        return zenoh.Config()
+    try:
+        return zenoh.Config.from_file(str(file))
+    except zenoh.ZError as error:
+        # Line and column come first, the reason last; between them the source, drawn on lines.
+        lines = str(error).split(" at /", 1)[0].strip().splitlines()
+        reason = ": ".join(dict.fromkeys([lines[0].strip(" ->"), lines[-1].strip(" =")]))
+        raise ValueError(f"{file}: no configuration of Zenoh (JSON5): {reason}") from None
 
 
 def client_config(endpoint: str, config_file: Path | None = None) -> zenoh.Config:
@@ -60,7 +69,7 @@ def client_config(endpoint: str, config_file: Path | None = None) -> zenoh.Confi
     Raises:
         ValueError: if the endpoint is not one; Zenoh itself would try it for ever.
     """
-    if not _ENDPOINT.fullmatch(endpoint):
+    if not ENDPOINT_PATTERN.fullmatch(endpoint):
         raise ValueError(f"connect: {endpoint!r} is no endpoint; write for example tcp/HOST:7447")
     config = _base_config(config_file)
     config.insert_json5("mode", '"client"')

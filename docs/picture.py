@@ -1,4 +1,4 @@
-"""Makes docs/console.png: the demo flies, and the page is caught as an arc is offered."""
+"""Makes docs/console.png: the demo flies, and the page is caught while an arc is flown."""
 
 import shutil
 import sys

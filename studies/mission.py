@@ -57,6 +57,7 @@ class MissionRecord:
         self._pictures = 0
         self._pictures_ns: tuple[int, int] | None = None
         self._mode: m.FlightMode = "landed"
+        self._flown = 0
         self.suggestions = 0
         self.accepted = 0
         self.takeovers = 0
@@ -95,11 +96,12 @@ class MissionRecord:
 
     def on_autopilot(self, status: m.AutopilotStatus, arrival_ns: int) -> None:
         """Take the autopilot's status: acceptances and take-overs are its changes of mode."""
-        if status.mode == "engaged" and self._mode != "engaged":
+        if status.mode == "engaged" and status.suggestion != self._flown:
             self.accepted += 1
-        if self._mode == "engaged" and status.mode == "manual":
+        if self._mode == "engaged" and status.mode == "manual" and status.reason == "stick":
             self.takeovers += 1
         self._mode = status.mode
+        self._flown = status.suggestion if status.mode == "engaged" else 0
 
     def on_vehicle(self, status: m.VehicleStatus, arrival_ns: int) -> None:
         """Take the vehicle's status."""

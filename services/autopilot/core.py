@@ -65,6 +65,7 @@ class Autopilot:
         self._took_off_ns = now_ns
         self._airborne_ns = now_ns
         self._status_due_ns = now_ns
+        self._sent_ns = now_ns
         self._announced: tuple[State, int] | None = None
         self._commanded: State | None = None
 
@@ -123,9 +124,10 @@ class Autopilot:
     # --- what goes out ---------------------------------------------------------------------------
 
     def step(self, now_ns: int, stamp_ns: int) -> Output:
-        """One period: failsafes, then the command, unless sticks drive it; the status in time."""
+        """One period: failsafes, then the command, unless a stick just made one; the status."""
         self._watch(now_ns)
-        return self._output(now_ns, stamp_ns, due=self._state.mode != "manual")
+        silent = now_ns - self._sent_ns >= nanoseconds(self._config.step_period_s)
+        return self._output(now_ns, stamp_ns, due=self._state.mode != "manual" or silent)
 
     def settle(self, now_ns: int, stamp_ns: int) -> Output:
         """What a decision changed, to go out before the next period."""
@@ -180,7 +182,7 @@ class Autopilot:
         if self._older(self._pose_ns, now_ns, config.hold_s):
             self._happen(Event.POSE_LOST, now_ns)
         if self._state.mode == "hover":
-            since_ns = max(self._link.arrival_ns or 0, self._airborne_ns)
+            since_ns = max(self._link.counted_ns or 0, self._airborne_ns)
             if self._older(since_ns, now_ns, config.land_after_s):
                 self._happen(Event.STICK_GONE, now_ns)
             elif self._state.reason == Event.POSE_LOST and self._older(
@@ -200,10 +202,12 @@ class Autopilot:
                 return str(told)
             if mode == "emergency" and told != "landed":
                 return mode
-        if self._link.is_deflected(now_ns):
-            # The operator lets go first: a stick still held would take over in the same step.
+        # The operator lets go first: a stick still held would take over in the same step. Sticks
+        # that do not count cannot, so they keep nobody from landing.
+        accepting = event is Event.ACCEPT
+        if self._link.commands(now_ns) or (accepting and self._link.is_deflected(now_ns)):
             return Event.STICK.value
-        return self._refusal_of_path(suggestion, now_ns) if event is Event.ACCEPT else None
+        return self._refusal_of_path(suggestion, now_ns) if accepting else None
 
     def _refusal_of_path(self, suggestion: int | None, now_ns: int) -> str | None:
         told = self._vehicle.state if self._vehicle else None
@@ -235,6 +239,7 @@ class Autopilot:
         if due or self._state != self._commanded:
             sticks = self._sticks(now_ns)
             self._commanded = self._state
+            self._sent_ns = now_ns
             command = self._guard.command(sticks, self._action(), self._state.mode, stamp_ns)
         return Output(command, self._status(now_ns, stamp_ns))
 

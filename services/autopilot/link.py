@@ -18,6 +18,8 @@ class StickLink:
         self._armed = True
         self.newest: Stick | None = None
         self.arrival_ns: int | None = None
+        self.counted_ns: int | None = None
+        """When the newest stick that counts arrived."""
 
     def receive(self, stick: Stick, now_ns: int) -> bool:
         """Take a stick in; False if it is older than the newest of the same unbroken link."""
@@ -29,6 +31,8 @@ class StickLink:
         if is_neutral(stick, self._dead_band):
             self._armed = True
         self.newest, self.arrival_ns = stick, now_ns
+        if self._armed:
+            self.counted_ns = now_ns
         return True
 
     def is_live(self, now_ns: int) -> bool:

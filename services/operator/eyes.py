@@ -133,7 +133,7 @@ class Eyes:
         if route.is_closed:
             near = np.arange(begin, min(end, begin + count)) % count
         else:
-            near = np.arange(max(begin, 0), min(end, count))
+            near = np.arange(max(begin, 0), min(end, count), dtype=np.intp)
         optical_m = to_optical(
             self._marks_m[near], np.asarray(pose.position), rotation_of(pose.orientation), FRONT
         )

@@ -61,6 +61,8 @@ AGAIN_S = 3.0
 CLIMB_LIMIT = 0.6
 TRIM_LIMIT = 0.3
 SEARCH_RADPS = 0.3
+OUT_OF_SIGHT = 1e4
+"""m and m/s."""
 
 
 class Phase(Enum):
@@ -195,7 +197,12 @@ class Pilot:
     # --- what reaches him ------------------------------------------------------------------------
 
     def truth(self, pose: Pose, arrival_ns: int) -> None:
-        """Where the vehicle truly is; he will see it late, through his eyes."""
+        """Where the vehicle truly is; he will see it late, through his eyes.
+
+        What is out of any world he can see is left out.
+        """
+        if max(map(abs, (*pose.position, *pose.velocity))) > OUT_OF_SIGHT:
+            return
         self._eyes.truth(pose, arrival_ns)
         # For the report only: no decision depends on it.
         position_m = np.asarray(pose.position)

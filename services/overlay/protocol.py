@@ -6,8 +6,10 @@ fewer pictures and never old ones.
 """
 
 import math
+from typing import Annotated
 
 import msgspec
+from msgspec import Meta
 
 from common.messages import Confidence, Count, DecideAction, Fraction
 from services.overlay.lease import Standing
@@ -40,7 +42,7 @@ class Decided(ClientMessage, frozen=True, tag="decide"):
     """A button was pressed."""
 
     action: DecideAction
-    nonce: int
+    nonce: Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)]
     suggestion: Count | None = None
 
 

@@ -52,7 +52,7 @@ def _console(node: Node, core: Overlay, config: Config) -> Console:
         )
         try:
             reply = node.ask("autopilot/decide", request)
-        except (QueryFailedError, RefusedError) as error:
+        except (QueryFailedError, RefusedError, m.InvalidPayloadError) as error:
             return protocol.Answer(decided.nonce, False, str(error))
         assert isinstance(reply, m.DecideReply)
         return protocol.Answer(decided.nonce, reply.ok, reply.reason)

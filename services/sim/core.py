@@ -130,7 +130,6 @@ class Simulation:
             for camera, phase in zip(cameras_of(config), (0.0, 0.5), strict=True)
         )
         self._world = worlds.load(config.world)
-        self._plant_name = config.plant
         self._seed = config.seed
         self._position_m = self._world.start_position_m
         self._yaw_rad = self._world.start_yaw_rad

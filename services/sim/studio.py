@@ -99,7 +99,6 @@ class Studio:
         self._scene: Scene | None = None
         self._stopping = False
         self._ready = False
-        self.taken: Counter[str] = Counter()
         self.dropped: Counter[str] = Counter()
         self.renderer = "starting"
         self.failure = ""
@@ -158,5 +157,4 @@ class Studio:
         for topic, shot in shots.items():
             picture = photograph(renderer, self._cameras[topic], shot, self._quality)
             self._publish(topic, picture)
-            self.taken[topic] += 1
         return True

@@ -98,8 +98,8 @@ class TestPictures:
     def test_the_path_is_drawn_where_a_camera_would_see_it(self, client, world):
         shown = client.next("overlay/front", lambda i: arrow_pixels(picture_of(i["data"])) > 500)
         picture = picture_of(shown["data"])
-        # The first arrow's solid part begins 1.43 m ahead and ends 1.7 m ahead.
-        row, column = on_path_px(1.55)
+        # The first arrow stands at 1.4 m: its solid part begins 1.63 m ahead and ends at 1.9 m.
+        row, column = on_path_px(1.75)
         assert np.ptp(picture[row, column].astype(int)) > 60
         above = picture[30:175].astype(int) - grey_picture()[30:175]
         assert np.abs(above).max() < 12

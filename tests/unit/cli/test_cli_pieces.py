@@ -1,6 +1,7 @@
 """The parts of the command line that need no network."""
 
 import argparse
+import threading
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,8 @@ from cli.main import main
 from cli.meter import WINDOW_S, Meter
 from cli.run import _service_in
 from common import messages as m
+from common.config import ConfigError
+from common.memory_bus import MemoryBus, MemoryNetwork
 from common.topics import QUERIES, TOPICS
 
 ROOT = Path(__file__).parents[3]
@@ -122,6 +125,14 @@ def test_the_doctor_says_what_to_do_about_what_is_missing(monkeypatch: pytest.Mo
         (["echo", "weather"], "no topic 'weather'"),
         (["echo", "pose", "--count", "0"], "whole number"),
         (["record", "--seconds", "-1"], "more than 0"),
+        (["demo", "--console-port", "99999"], "--console-port: '99999': use a port, 1 to 65535"),
+        (["up", "--console-port", "-1"], "--console-port: '-1': use a port, 1 to 65535"),
+        (["up", "--world", "nowhere"], "--world: invalid choice"),
+        (["up", "--source", "nobody"], "--source: invalid choice"),
+        (["demo", "--seed", "x"], "--seed: 'x': use a whole number from 0"),
+        (["train", "--seed", "x"], "--seed: 'x': use a whole number from 0"),
+        (["router", "--listen", "foo"], "--listen: 'foo' is no endpoint"),
+        (["topics", "--connect", "localhost:7447"], "--connect: 'localhost:7447' is no endpoint"),
     ],
 )
 def test_wrong_usage_is_one_line_and_exit_code_2(
@@ -135,11 +146,64 @@ def test_wrong_usage_is_one_line_and_exit_code_2(
     assert text.count("\n") == 1
 
 
-def test_an_endpoint_that_is_none_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["topics", "--once", "--connect", "localhost:7447"]) == 2
-    text = capsys.readouterr().err
-    assert "no endpoint" in text
-    assert text.count("\n") == 1
+def test_the_figures_as_json_are_those_of_one_lap(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", "--json"]) == 2
+    assert capsys.readouterr().err.startswith("autocomplete demo: --json: ")
+
+
+@pytest.fixture
+def undisturbed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leaves pytest its own signals and log."""
+    monkeypatch.setattr("cli.router.stop_on_signals", threading.Event)
+    monkeypatch.setattr("common.run.stop_on_signals", threading.Event)
+    monkeypatch.setattr("common.log.configure", lambda *_: None)
+
+
+@pytest.mark.usefixtures("undisturbed")
+@pytest.mark.parametrize(
+    "words", [["router", "--config"], ["run", "recorder", "--zenoh-config"]], ids=" ".join
+)
+@pytest.mark.parametrize("text", ["{ bad", "{ listen: { endpoints: 3 } }"])
+def test_a_file_that_is_none_of_zenohs_is_wrong_usage(
+    words: list[str], text: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "bad.json5"
+    file.write_text(text)
+    assert main([*words, str(file)]) == 2
+    said = capfd.readouterr().err
+    assert said.startswith(f"autocomplete {words[0]}: {file}: no configuration of Zenoh")
+    assert "/.cargo/" not in said
+    assert said.count("\n") == 1
+
+
+def test_a_fault_of_the_program_is_one_line_unless_asked_for_more(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail() -> str:
+        raise KeyError("pose")
+
+    monkeypatch.setattr("cli.contract.page", fail)
+    monkeypatch.delenv("AUTOCOMPLETE_DEBUG", raising=False)
+    assert main(["contract"]) == 1
+    assert capsys.readouterr().err == (
+        "autocomplete contract: KeyError: 'pose' (AUTOCOMPLETE_DEBUG=1 shows where)\n"
+    )
+    monkeypatch.setenv("AUTOCOMPLETE_DEBUG", "1")
+    with pytest.raises(KeyError):
+        main(["contract"])
+
+
+@pytest.mark.usefixtures("undisturbed")
+def test_what_a_service_lacks_on_this_machine_is_one_line_and_exit_code_1(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def wire(node: object, config: object) -> None:
+        raise ConfigError("recorder: no disk")
+
+    monkeypatch.setattr("services.recorder.service.wire", wire)
+    monkeypatch.setattr("common.run.open_bus", lambda *_: MemoryBus(MemoryNetwork()))
+    assert main(["run", "recorder"]) == 1
+    assert capsys.readouterr().err == "autocomplete run: recorder: no disk\n"
 
 
 def test_every_command_explains_itself(capsys: pytest.CaptureFixture[str]) -> None:

@@ -197,6 +197,8 @@ def test_every_bound_is_kept(payload: type[m.Payload], data: st.DataObject) -> N
         if isinstance(inner, msgspec.inspect.LiteralType):
             beyond.append("something else")
         for value in beyond:
+            if isinstance(value, int) and not -(2**63) <= value < 2**64:
+                continue  # MessagePack itself has no such number
             with pytest.raises(m.InvalidPayloadError, match=field.encode_name):
                 m.decode(msgpack.packb({**wire, field.encode_name: value}), payload)
 
@@ -222,7 +224,7 @@ INTENT = {
     "stamp": 1,
     "seq": 0,
     "label": "arc",
-    "probabilities": {"line": 0.2, "arc": 0.8},
+    "probabilities": {"line": 0.2, "arc": 0.8, "sine": 0.0, "helix": 0.0},
     "confidence": 0.8,
     "window_start": 0,
     "window_end": 1,
@@ -236,6 +238,7 @@ INTENT = {
     [
         ({"probabilities": {"line": 0.2, "arc": 0.7}}, "sum to"),
         ({"probabilities": {}}, "sum to"),
+        ({"probabilities": {"line": 0.2, "arc": 0.8}}, "lack sine, helix"),
         ({"label": "loop"}, "not among"),
         ({"window_end": -1}, "before"),
     ],

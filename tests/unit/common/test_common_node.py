@@ -117,9 +117,33 @@ def test_a_handler_is_told_when_the_message_arrived(world: World) -> None:
     node.on("stick", lambda _, arrival_ns: arrivals_ns.append(arrival_ns))
     arrived_ns = world.clock.monotonic_ns()
     world.put("stick", stick())
-    world.clock.advance(0.5)
+    world.clock.advance(0.1)
     node.spin()
     assert arrivals_ns == [arrived_ns]
+
+
+def test_a_command_that_waited_too_long_is_not_acted_on(world: World) -> None:
+    node = world.node("autopilot")
+    seen: list[int] = []
+    node.on("stick", lambda message, _: seen.append(message.seq))
+    world.put("stick", stick())
+    world.clock.advance(TOPICS["stick"].max_age_s + 0.01)
+    node.spin()
+    assert seen == []
+
+
+def test_a_fault_in_handling_a_message_ends_nothing_and_is_told(world: World) -> None:
+    node = world.node("autopilot")
+
+    def fail(_message: m.Stick, _arrival_ns: int) -> None:
+        raise ZeroDivisionError("a bug")
+
+    node.on("stick", fail)
+    world.put("stick", stick())
+    node.spin()
+    health = health_of(world, node)
+    assert health["state"] == "degraded"
+    assert "1 messages could not be handled" in health["detail"]
 
 
 def test_invalid_payloads_are_dropped_counted_and_logged_once_a_second(

@@ -19,14 +19,10 @@ def test_a_fault_of_a_service_is_logged_and_exit_code_1(
     network = MemoryNetwork()
     node = Node(MemoryBus(network), "unit", "autopilot")
 
-    def fail(_message: m.Stick, _arrival_ns: int) -> None:
+    def fail(_now_ns: int) -> None:
         raise fault("a bug")
 
-    node.on("stick", fail)
-    stick = m.Stick(stamp=1, seq=0, vx=0.0, vy=0.0, vz=0.0, wz=0.0)
-    MemoryBus(network).publication(key_of("unit", "stick"), Delivery.COMMAND, "").put(
-        m.encode(stick)
-    )
+    node.every(0.001, fail)
     with caplog.at_level(logging.ERROR):
         assert _serve(node, threading.Event()) == 1
     assert "autopilot failed" in caplog.text
