@@ -180,6 +180,8 @@ def _plain_type(info: inspect.Type) -> tuple[str, str]:
 
 
 def _interval(info: Any) -> str:
+    if info.ge == -(2**63):
+        return "64 bits"
     low = info.ge if info.ge is not None else info.gt
     if low is None:
         return ""

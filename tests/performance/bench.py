@@ -22,7 +22,7 @@ from cli import launch
 from common import messages as m
 from common.clock import SystemClock, nanoseconds, seconds, sleep
 from common.node import Node
-from common.topics import SERVICES, TOPICS, alive_key_of
+from common.topics import SERVICES, TOPICS, alive_key_of, key_of
 from common.zenoh_bus import ZenohBus
 
 WARM_UP_S = 10.0
@@ -141,15 +141,14 @@ def time_sticks(system: launch.System, count: int, progress: Progress) -> list[R
     taken_s: list[float] = []
     node = Node(bus, system.vehicle, "bench")
 
-    def on_command(command: m.Command, arrival_ns: int) -> None:
-        if command.vx in sent_ns:
-            taken_s.append(seconds(arrival_ns - sent_ns.pop(command.vx)))
+    def on_command(payload: bytes) -> None:
+        arrival_ns = clock.monotonic_ns()
+        vx = m.decode(payload, m.Command).vx
+        if vx in sent_ns:
+            taken_s.append(seconds(arrival_ns - sent_ns.pop(vx)))
 
-    node.on("command", on_command, depth=64)
+    bus.subscribe(key_of(system.vehicle, "command"), on_command)
     node.publishes("stick")
-    stop = threading.Event()
-    reader = threading.Thread(target=node.run, args=(stop,))
-    reader.start()
     task = progress.add_task("stick to command", total=count)
     try:
         begin_ns = clock.monotonic_ns()
@@ -170,9 +169,6 @@ def time_sticks(system: launch.System, count: int, progress: Progress) -> list[R
             due_ns = begin_ns + nanoseconds((index + NEUTRAL_STICKS + 1) * STICK_PERIOD_S)
             sleep(seconds(due_ns - clock.monotonic_ns()))
     finally:
-        stop.set()
-        node.wake()
-        reader.join()
         node.close()
     p50, p99 = np.percentile(taken_s, [50, 99]) * 1e3
     target = f"<= {TARGET_STICK_TO_COMMAND_MS:.0f}"

@@ -5,11 +5,9 @@ import threading
 
 import pytest
 
-from common import messages as m
 from common.memory_bus import MemoryBus, MemoryNetwork
 from common.node import Node
 from common.run import _serve
-from common.topics import Delivery, key_of
 
 
 @pytest.mark.parametrize("fault", [ValueError, OSError, KeyError, ZeroDivisionError])
