@@ -119,15 +119,15 @@ def fly(system: launch.System, duration_s: float, progress: Progress) -> list[Ro
         for topic, count in meter.counts.items():
             target = f">= {TARGET_HZ[topic]:.0f}" if topic in TARGET_HZ else ""
             rows.append(
-                Row(f"{topic} [Hz]", count / elapsed_s, TOPICS[topic].rate_hz or 1.0, target)
+                Row(f"{topic} (Hz)", count / elapsed_s, TOPICS[topic].rate_hz or 1.0, target)
             )
         cores = float(psutil.cpu_count() or 1)
         shares = {
             name: (processor_s(process) - used_s[name]) / elapsed_s
             for name, process in processes.items()
         }
-        rows += [Row(f"processor of {n} [cores]", share, cores) for n, share in shares.items()]
-        rows.append(Row("processor of all [cores]", sum(shares.values()), cores))
+        rows += [Row(f"processor of {n} (cores)", share, cores) for n, share in shares.items()]
+        rows.append(Row("processor of all (cores)", sum(shares.values()), cores))
         return rows
     finally:
         meter.node.close()
@@ -174,8 +174,8 @@ def time_sticks(system: launch.System, count: int, progress: Progress) -> list[R
     target = f"<= {TARGET_STICK_TO_COMMAND_MS:.0f}"
     return [
         Row("sticks answered by a command", len(taken_s), count),
-        Row("stick to command p50 [ms]", float(p50), TARGET_STICK_TO_COMMAND_MS),
-        Row("stick to command p99 [ms]", float(p99), TARGET_STICK_TO_COMMAND_MS, target),
+        Row("stick to command p50 (ms)", float(p50), TARGET_STICK_TO_COMMAND_MS),
+        Row("stick to command p99 (ms)", float(p99), TARGET_STICK_TO_COMMAND_MS, target),
     ]
 
 
