@@ -6,6 +6,10 @@ from dataclasses import dataclass
 from common.sticks import DEAD_BAND
 from common.topics import TOPICS
 
+SHORTEST_PERIOD_S = 0.001
+LONGEST_PERIOD_S = 0.1
+"""Longer than this, a stick's loss would be seen too late."""
+
 
 @dataclass(frozen=True)
 class Config:
@@ -78,6 +82,12 @@ class Config:
                     raise ValueError(f"{field.name} must not be negative, is {value}")
             elif value <= 0.0:
                 raise ValueError(f"{field.name} must be positive, is {value}")
+        for name in ("step_period_s", "status_period_s"):
+            if not SHORTEST_PERIOD_S <= getattr(self, name) <= LONGEST_PERIOD_S:
+                raise ValueError(
+                    f"{name} must be {SHORTEST_PERIOD_S} to {LONGEST_PERIOD_S} s,"
+                    f" is {getattr(self, name)}"
+                )
         for name in ("dead_band", "max_speed_fraction"):
             if getattr(self, name) >= 1.0:
                 raise ValueError(f"{name} must be below 1, is {getattr(self, name)}")
