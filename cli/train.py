@@ -125,12 +125,12 @@ def _report(console: Console, run: "Run") -> None:
 
 
 def _confusion(judged: "Judged") -> Table:
-    from training.generator.shapes import LABELS
+    from training.labels import PRIMITIVES
 
     table = Table(box=SIMPLE, title=f"{judged.name}: was (rows), said (columns)")
     table.add_column("")
-    for label in LABELS:
+    for label in PRIMITIVES:
         table.add_column(label, justify="right")
-    for label, row in zip(LABELS, judged.whole.confusion.tolist(), strict=True):
+    for label, row in zip(PRIMITIVES, judged.whole.confusion.tolist(), strict=True):
         table.add_row(label, *(str(n) for n in row))
     return table

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from training.generator.dataset import counts_of
 from training.generator.operators import FAMILIES
-from training.generator.shapes import LABELS
+from training.labels import PRIMITIVES
 
 if TYPE_CHECKING:
     from training.train import Judged, Run
@@ -21,10 +21,10 @@ def _row(judged: "Judged") -> str:
 
 
 def _confusion(judged: "Judged") -> str:
-    head = f"| was \\ said | {' | '.join(LABELS)} |\n|{'---|' * (len(LABELS) + 1)}\n"
+    head = f"| was \\ said | {' | '.join(PRIMITIVES)} |\n|{'---|' * (len(PRIMITIVES) + 1)}\n"
     rows = (
         f"| {label} | {' | '.join(str(n) for n in row)} |\n"
-        for label, row in zip(LABELS, judged.whole.confusion.tolist(), strict=True)
+        for label, row in zip(PRIMITIVES, judged.whole.confusion.tolist(), strict=True)
     )
     return head + "".join(rows)
 
@@ -47,14 +47,14 @@ def card_of(run: "Run") -> str:
     epochs = len(run.fitted.history)
     return f"""# intent.onnx
 
-Which primitive do the sticks draw: {", ".join(LABELS)}?
+Which primitive do the sticks draw: {", ".join(PRIMITIVES)}?
 Written by `autocomplete train --preset {run.preset_name} --seed {run.seed}`; its figures for
 programs are in intent.json, how it works is in docs/model.md.
 
 - SHA-256: `{run.sha256}`
 - Input: `sticks` (batch, time, 3) float32: vx, vy, vz as fractions of full stick at 50 Hz, in
   the frame of the heading at the window's start; `lengths` (batch,) int64. At most 200 samples.
-- Output: `probabilities` (batch, {len(LABELS)}).
+- Output: `probabilities` (batch, {len(PRIMITIVES)}).
 - ONNX against torch on test windows: largest difference {run.parity:.1e}.
 
 ## Data
@@ -94,6 +94,6 @@ whole primitives, as many as the thesis has. It does not see vz, so it cannot te
 
 - No person's sticks are in the data. How well it does on people is not known.
 - The operators held out are of the same families as those it learned from.
-- It always answers one of {len(LABELS)}; rest and too short motions are told apart by the service.
+- It always answers one of {len(PRIMITIVES)}; rest and too short motions are the service's to tell.
 - A wide slow sine looks like an arc until its inflection is within the 4 s window.
 """

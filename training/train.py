@@ -10,10 +10,11 @@ import numpy as np
 
 from services.classifier.model import OnnxModel
 from training.card import card_of
+from training.dataset.primitive import Primitive
 from training.export import export
 from training.fit import Epoch, Fitted, fit
-from training.generator.dataset import THESIS_COUNTS, Primitive, counts_of, generate
-from training.generator.shapes import LABELS
+from training.generator.dataset import THESIS_COUNTS, counts_of, generate
+from training.labels import PRIMITIVES
 from training.scores import Score, calibration_error, score, weighted_f1
 from training.svm import features, fit_svm
 from training.windows import Examples, Windows, examples_of, seen_after
@@ -135,7 +136,7 @@ def judge(
         families: the kind of people of each example.
         has_probabilities: whether `say` gives probabilities.
     """
-    classes = len(LABELS)
+    classes = len(PRIMITIVES)
     whole_said = say(seen_after(examples, None))
     truth, people = examples.labels, examples.operators
     said = whole_said.argmax(axis=1)
@@ -197,14 +198,14 @@ def train(preset_name: str, seed: int, out: Path, progress: Progress) -> Run:
     fitted = fit(
         training,
         validation,
-        len(LABELS),
+        len(PRIMITIVES),
         preset.epochs,
         seed,
         progress.batch,
         lambda epoch: progress.epoch(epoch, preset.epochs),
     )
     path = out / f"{MODEL_NAME}.onnx"
-    sha256 = export(fitted, LABELS, MODEL_NAME, path)
+    sha256 = export(fitted, PRIMITIVES, MODEL_NAME, path)
     model = OnnxModel(path)
     machine = fit_svm(seen_after(_share(training, sum(THESIS_COUNTS.values())), None))
     families = [primitive.family for primitive in tested]

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from common.sticks import FULL_STICK
 from services.classifier.window import MODEL_RATE_HZ, WINDOW_SAMPLES, at_rate, in_start_frame
-from training.generator.dataset import Primitive
+from training.dataset.primitive import Primitive
+from training.labels import PRIMITIVES
 
 Array32 = NDArray[np.float32]
 IntArray = NDArray[np.int64]
@@ -69,8 +70,8 @@ def examples_of(primitives: Sequence[Primitive]) -> Examples:
     )
     return Examples(
         tracks,
-        np.array([p.label for p in primitives], dtype=np.int64),
-        np.array([p.operator for p in primitives], dtype=np.int64),
+        np.array([PRIMITIVES.index(p.label) for p in primitives], dtype=np.int64),
+        np.unique([p.operator for p in primitives], return_inverse=True)[1].astype(np.int64),
     )
 
 

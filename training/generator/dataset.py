@@ -1,14 +1,14 @@
 """Sets of labelled sticks: operators of many families, each performing all four primitives."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from training.dataset.primitive import Primitive
 from training.generator.hands import STEP_S, hand
 from training.generator.operators import FAMILIES, Family, Operator, Style, draw_operator
 from training.generator.pilots import pilot
-from training.generator.shapes import LABELS, Array, hand_plan, path_plan
+from training.generator.shapes import Array, hand_plan, path_plan
 
 THESIS_COUNTS = {"line": 597, "arc": 716, "sine": 617, "helix": 469}
 """The thesis' 2399 primitives."""
@@ -17,32 +17,13 @@ SHORTEST_S, LONGEST_SAMPLES = 1.0, 400
 """The thesis drops what is shorter than a second or longer than 400 samples."""
 
 
-@dataclass(frozen=True)
-class Primitive:
-    """One performance of a primitive.
-
-    Attributes:
-        times_s: (N,) irregular, from 0.
-        sticks: (N, 4) vx vy vz wz as fractions of full stick, heading frame.
-        label: index into `LABELS`.
-        operator: who; the number is unique in a set.
-        family: the kind of people the operator is of.
-    """
-
-    times_s: Array
-    sticks: Array
-    label: int
-    operator: int
-    family: str
-
-
 def counts_of(multiple: float) -> dict[str, int]:
     """The thesis' counts by label, times `multiple`."""
     return {label: max(1, round(count * multiple)) for label, count in THESIS_COUNTS.items()}
 
 
 def perform(
-    label: str, family: Family, who: Operator, number: int, rng: np.random.Generator
+    label: str, family: Family, who: Operator, name: str, source: str, rng: np.random.Generator
 ) -> Primitive:
     """One primitive by one person, sampled as a pad is: irregular times, lost samples."""
     while True:
@@ -53,7 +34,7 @@ def perform(
             sticks = pilot(path_plan(label, rng), who, family.style, duration_s, rng)
         times_s, sticks = _sampled(sticks, who, rng)
         if times_s[-1] >= SHORTEST_S and len(times_s) <= LONGEST_SAMPLES:
-            return Primitive(times_s, sticks, LABELS.index(label), number, family.name)
+            return Primitive(times_s, sticks, label, name, family.name, source)
 
 
 def _sampled(sticks: Array, who: Operator, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -102,7 +83,8 @@ def generate(
             number = turn % operators
             family, who = people[number]
             rng = np.random.default_rng(streams[len(primitives)])
-            primitives.append(perform(label, family, who, number, rng))
+            name = f"{family.name}-{number:04d}"
+            primitives.append(perform(label, family, who, name, f"generator wide seed {seed}", rng))
             if turn % 20 == 19:
                 progress(20)
     return primitives

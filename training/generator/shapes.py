@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-LABELS = ("line", "arc", "sine", "helix")
-"""The primitives, in the order of the model's outputs."""
-
 HAND_DURATIONS_S = {"line": (1.2, 5.0), "arc": (1.5, 6.5), "sine": (2.6, 8.0), "helix": (2.0, 7.5)}
 """The thesis aimed at 2 s at least; its sinusoids last 229 samples, 5 s, on average."""
 PATH_STEP_M = 0.05

@@ -4,16 +4,17 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
+from training.dataset.primitive import Primitive
 from training.generator.dataset import (
     LONGEST_SAMPLES,
     SHORTEST_S,
     THESIS_COUNTS,
-    Primitive,
     generate,
 )
 from training.generator.hands import slow_noise
 from training.generator.operators import FAMILIES, Style, draw_operator
-from training.generator.shapes import LABELS, PATH_STEP_M, path_plan
+from training.generator.shapes import PATH_STEP_M, path_plan
+from training.labels import PRIMITIVES
 
 COUNTS = {"line": 40, "arc": 40, "sine": 40, "helix": 40}
 
@@ -25,13 +26,13 @@ def primitives() -> list[Primitive]:
 
 def test_the_thesis_counts_are_2399() -> None:
     assert sum(THESIS_COUNTS.values()) == 2399
-    assert tuple(THESIS_COUNTS) == LABELS
+    assert tuple(THESIS_COUNTS) == PRIMITIVES
 
 
 def test_a_set_holds_what_was_asked_for(primitives: list[Primitive]) -> None:
-    labels = [LABELS[p.label] for p in primitives]
-    assert {label: labels.count(label) for label in LABELS} == COUNTS
-    assert {p.operator for p in primitives} == set(range(20))
+    labels = [p.label for p in primitives]
+    assert {label: labels.count(label) for label in PRIMITIVES} == COUNTS
+    assert len({p.operator for p in primitives}) == 20
     assert {p.family for p in primitives} == {family.name for family in FAMILIES}
 
 
@@ -59,9 +60,9 @@ def test_sticks_are_those_of_a_pad(primitives: list[Primitive]) -> None:
 
 
 def test_only_helices_and_climbing_lines_climb(primitives: list[Primitive]) -> None:
-    climb = {label: [] for label in LABELS}
+    climb = {label: [] for label in PRIMITIVES}
     for p in primitives:
-        climb[LABELS[p.label]].append(abs(float(p.sticks[:, 2].mean())))
+        climb[p.label].append(abs(float(p.sticks[:, 2].mean())))
     assert np.median(climb["helix"]) > 0.15
     for level in ("arc", "sine"):
         assert np.median(climb[level]) < 0.05
@@ -87,7 +88,7 @@ def test_there_are_hands_and_pilots() -> None:
     assert {family.style for family in FAMILIES} == set(Style)
 
 
-@pytest.mark.parametrize("label", LABELS)
+@pytest.mark.parametrize("label", PRIMITIVES)
 def test_paths_are_evenly_sampled_from_the_origin(label: str) -> None:
     for seed in range(20):
         plan = path_plan(label, np.random.default_rng(seed))

@@ -8,7 +8,7 @@ import torch
 from services.classifier.model import OnnxModel
 from training.export import export
 from training.fit import Fitted
-from training.generator.shapes import LABELS
+from training.labels import PRIMITIVES
 from training.network import CnnGru, Probabilities
 
 TEMPERATURE = 0.9
@@ -19,7 +19,7 @@ torch.set_num_threads(1)
 def network() -> CnnGru:
     """Untrained, but with the statistics and slopes of a trained one."""
     torch.manual_seed(3)
-    network = CnnGru(len(LABELS))
+    network = CnnGru(len(PRIMITIVES))
     for module in network.modules():
         if isinstance(module, torch.nn.BatchNorm1d):
             module.running_mean.normal_(0.0, 0.3)
@@ -56,7 +56,7 @@ def torch_says(network: CnnGru, sticks: np.ndarray) -> np.ndarray:
 
 def test_the_file_says_what_torch_says_at_every_length(network: CnnGru, tmp_path: Path) -> None:
     path = tmp_path / "intent.onnx"
-    export(Fitted(network, TEMPERATURE, ()), LABELS, "intent", path)
+    export(Fitted(network, TEMPERATURE, ()), PRIMITIVES, "intent", path)
     assert [p.name for p in tmp_path.iterdir()] == ["intent.onnx"], "weights lie beside the file"
     model = OnnxModel(path)
     said = set()
@@ -72,7 +72,7 @@ def test_the_file_says_what_torch_says_at_every_length(network: CnnGru, tmp_path
 
 def test_the_file_takes_batches_of_different_lengths(network: CnnGru, tmp_path: Path) -> None:
     path = tmp_path / "intent.onnx"
-    export(Fitted(network, TEMPERATURE, ()), LABELS, "intent", path)
+    export(Fitted(network, TEMPERATURE, ()), PRIMITIVES, "intent", path)
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
     rows = [sticks_of(length, length) for length in (33, 200, 120)]
     batch = np.zeros((3, 200, 3), dtype=np.float32)

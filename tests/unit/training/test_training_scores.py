@@ -5,7 +5,7 @@ from sklearn.metrics import f1_score
 
 from training.fit import class_weights, temperature_of
 from training.generator.dataset import generate
-from training.generator.shapes import LABELS
+from training.labels import PRIMITIVES
 from training.scores import calibration_error, score, weighted_f1
 from training.svm import features, fit_svm
 from training.windows import (
@@ -20,7 +20,7 @@ from training.windows import (
 
 @pytest.fixture(scope="module")
 def examples() -> Examples:
-    return examples_of(generate(10, dict.fromkeys(LABELS, 25), seed=1))
+    return examples_of(generate(10, dict.fromkeys(PRIMITIVES, 25), seed=1))
 
 
 def test_f1_is_that_of_a_library_not_eq_5_1() -> None:

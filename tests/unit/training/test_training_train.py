@@ -7,7 +7,7 @@ from cli.main import main
 from services.classifier.model import OnnxModel
 from training import train as training
 from training.fit import Epoch
-from training.generator.shapes import LABELS
+from training.labels import PRIMITIVES
 from training.train import Preset, train
 
 TINY = Preset(
@@ -51,7 +51,7 @@ def test_a_run_leaves_a_model_its_card_and_its_figures(tmp_path: Path) -> None:
     run = train("quick", 7, tmp_path, told)
     model = OnnxModel(tmp_path / "intent.onnx")
     assert model.name == f"intent-{run.sha256[:8]}"
-    assert model.labels == LABELS
+    assert model.labels == PRIMITIVES
     assert run.parity < 1e-5
     card = (tmp_path / "README.md").read_text()
     assert run.sha256 in card
