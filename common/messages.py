@@ -106,7 +106,11 @@ class Intent(Message, frozen=True, kw_only=True):
 
 
 class Suggestion(Message, frozen=True, kw_only=True):
-    """A path that continues the operator's motion, starting at the vehicle."""
+    """A path that continues the operator's motion, starting at the vehicle.
+
+    The same `id` again is the same meaning with a newer path. `params_std` holds standard errors of
+    `params` by their names, `note` why the path is simpler, shorter or slower than what was asked.
+    """
 
     id: Annotated[int, Meta(gt=0)]
     primitive: Name
@@ -117,6 +121,15 @@ class Suggestion(Message, frozen=True, kw_only=True):
     fit_rms: NonNegative
     confidence: Confidence
     heading_sector: Annotated[int, Meta(ge=0, le=7)]
+    params_std: dict[str, NonNegative] | None = None
+    note: Annotated[str, Meta(max_length=200)] | None = None
+
+
+class Refusal(Message, frozen=True, kw_only=True):
+    """Why what the operator means, `label`, is not suggested: for the screen."""
+
+    label: Name
+    reason: Annotated[str, Meta(max_length=200)]
 
 
 class AutopilotStatus(Message, frozen=True, kw_only=True):

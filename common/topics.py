@@ -82,6 +82,7 @@ _ROWS = (
         _E,
         3.0,
     ),
+    Topic("refusal", m.Refusal, "synthesis", ("overlay",), None, _E, 3.0),
     Topic("autopilot", m.AutopilotStatus, "autopilot", ("overlay", "operator"), 20.0, _E, 0.5),
     Topic("command", m.Command, "autopilot", ("sim",), 50.0, _C, 0.2),
     Topic("pose", m.Pose, "localizer", ("synthesis", "autopilot", "overlay"), 50.0, _S, 0.11),
