@@ -5,11 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from common.messages import NONE_LABEL, PRIMITIVES
+from training.labels import CLASSES
 
 Array = NDArray[np.float64]
-
-LABELS = (*PRIMITIVES, NONE_LABEL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +20,7 @@ class Primitive:
     Attributes:
         times_s: (N,) of each sample since the first, rising, irregular as a pad's are.
         sticks: (N, 4) vx vy vz wz as fractions of full stick, heading frame.
-        label: what was performed, one of `LABELS`.
+        label: what was performed, one of `CLASSES`.
         operator: who; unique in a set.
         family: the kind of people the operator is of, "" if unknown.
         source: where it is from: a generator's preset and seed, or a file's name.
@@ -41,8 +39,8 @@ class Primitive:
     utc_ns: int = 0
 
     def __post_init__(self) -> None:
-        if self.label not in LABELS:
-            raise ValueError(f"label {self.label!r} is unknown; use {', '.join(LABELS)}")
+        if self.label not in CLASSES:
+            raise ValueError(f"label {self.label!r} is unknown; use {', '.join(CLASSES)}")
         if self.times_s.ndim != 1 or self.sticks.shape != (len(self.times_s), 4):
             raise ValueError(
                 f"times_s has shape {self.times_s.shape}, sticks {self.sticks.shape};"
