@@ -73,22 +73,28 @@ def run_service(
     settings = config.load(config_type_of(service), service, config_file, flags=flags)
     log.configure(service, vehicle)
     stop = stop_on_signals()
-    bus = open_bus(stop, endpoint, zenoh_config_file)
-    if bus is None:
-        return 0
-    node = Node(bus, vehicle, service)
+    wiring = importlib.import_module(f"services.{service}.service")
+    node = None
     try:
-        importlib.import_module(f"services.{service}.service").wire(node, settings)
+        if hasattr(wiring, "check"):
+            # What can be refused without a network does not wait for one.
+            wiring.check(settings)
+        bus = open_bus(stop, endpoint, zenoh_config_file)
+        if bus is None:
+            return 0
+        node = Node(bus, vehicle, service)
+        wiring.wire(node, settings)
         # What is loaded by now stays: to search it for garbage stops the service for 20 ms or more.
         gc.collect()
         gc.freeze()
         _logger.info("%s is up", service)
         return _serve(node, stop)
     except config.ConfigError as error:
-        # Well-formed, so it is no wrong usage: wire() found no such device, model or world here.
+        # Well-formed, so it is no wrong usage: there is no such device, model or world here.
         raise OSError(str(error)) from None
     finally:
-        node.close()
+        if node is not None:
+            node.close()
 
 
 def _serve(node: Node, stop: threading.Event) -> int:

@@ -1,18 +1,26 @@
 """Sticks in, intents out: which primitive the operator has begun, or none."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from common.clock import NS_PER_S, seconds
-from common.messages import NONE_LABEL, ClassifyRequest, Intent, Stick
-from common.sticks import DEAD_BAND
+from common.messages import NONE_LABEL, ClassifyRequest, Intent, Stick, VehicleStatus
+from common.sticks import FULL_STICK
 from common.topics import TOPICS
 from services.classifier.config import Config
-from services.classifier.model import Model
-from services.classifier.window import WINDOW_S, Array, StickWindow, for_model
+from services.classifier.model import SHORTEST_SAMPLES, Model, ModelError
+from services.classifier.window import (
+    WINDOW_S,
+    WINDOW_SAMPLES,
+    Motion,
+    StickWindow,
+    at_rate,
+    newest_motion,
+)
 
-LOWEST_RATE_HZ = 5.0
-"""Sticks that come more slowly than this do not tell one shape from another."""
+LOWEST_RATE_HZ, HIGHEST_RATE_HZ = 20.0, 100.0
+"""Rates of given samples: of pads and browsers, and what robustness was tested at."""
+_PLANT = "tum"
+"""What is flown as long as the vehicle has not said."""
 
 
 class UnusableSamplesError(ValueError):
@@ -26,21 +34,35 @@ class UnusableSamplesError(ValueError):
 class Classifier:
     """Watches the sticks and says what they mean.
 
+    `none` is said where there is no motion to ask the model about (no stick for 0.2 s, sticks at
+    rest, a motion of less than `SHORTEST_SAMPLES`), and where the model is less confident than its
+    calibration asks for.
+
     Args:
-        config: thresholds.
-        model: gives probabilities to a window.
+        config: settings.
+        model: says what a window means; may be exchanged at any time.
+
+    Attributes:
+        model: as above.
+        fault: why the model gave no answer when it was last asked, or "".
     """
 
     def __init__(self, config: Config, model: Model) -> None:
+        self.model = model
+        self.fault = ""
         self._config = config
-        self._model = model
         self._window = StickWindow()
         self._arrival_ns: int | None = None
+        self._plant = _PLANT
 
     def on_stick(self, stick: Stick, arrival_ns: int) -> None:
         """Take a stick; `arrival_ns` is on the receiver's clock."""
-        self._window.add(stick)
-        self._arrival_ns = arrival_ns
+        if self._window.add(stick):
+            self._arrival_ns = arrival_ns
+
+    def on_vehicle(self, status: VehicleStatus, _arrival_ns: int) -> None:
+        """Take what is flown: its yaw rate tells how far a held yaw stick turns it."""
+        self._plant = status.plant
 
     def intent(self, now_ns: int, session_ns: int) -> Intent:
         """What the operator means now.
@@ -55,65 +77,73 @@ class Classifier:
         if seconds(now_ns - self._arrival_ns) > TOPICS["stick"].max_age_s:
             return self._none(newest_ns)
         motion = self._window.motion()
-        if motion is None:
-            return self._none(newest_ns)
-        times_s = (motion.stamps_ns - motion.stamps_ns[0]) / NS_PER_S
-        return self._classified(
-            times_s, motion.sticks, int(motion.stamps_ns[0]), int(motion.stamps_ns[-1])
-        )
+        return self._none(newest_ns) if motion is None else self._meaning(motion)
 
     def classify(self, request: ClassifyRequest, session_ns: int) -> Intent:
-        """The intent of given samples at a constant rate, the newest `WINDOW_S` of them.
+        """The intent of the newest motion in given samples at a constant rate, as in flight.
 
         Raises:
-            UnusableSamplesError: if a sample is beyond full stick, or the rate is too low.
+            UnusableSamplesError: if a sample is beyond full stick, or the rate is out of range.
         """
-        if request.rate < LOWEST_RATE_HZ:
+        rate_hz = request.rate
+        if not LOWEST_RATE_HZ <= rate_hz <= HIGHEST_RATE_HZ:
             raise UnusableSamplesError(
-                f"rate is {request.rate} Hz; at least {LOWEST_RATE_HZ} is needed", "rate"
+                f"rate is {rate_hz:g} Hz; use {LOWEST_RATE_HZ:g} to {HIGHEST_RATE_HZ:g}", "rate"
             )
         sticks = np.array(request.samples, dtype=np.float64)
         if float(np.abs(sticks).max()) > 1.0:
             raise UnusableSamplesError("samples are fractions of full stick, -1 to 1", "samples")
-        sticks = sticks[-(int(WINDOW_S * request.rate) + 1) :]
-        times_s = np.arange(len(sticks)) / request.rate
-        start_ns = session_ns - round(float(times_s[-1]) * NS_PER_S)
-        if float(np.abs(sticks).max()) <= DEAD_BAND:
-            return self._none(session_ns, start_ns, len(sticks))
-        yawless = np.concatenate([sticks, np.zeros((len(sticks), 1))], axis=1)
-        return self._classified(times_s, yawless, start_ns, session_ns)
+        span = newest_motion(sticks, rate_hz)
+        end_ns = session_ns - round((len(sticks) - span.stop) / rate_hz * NS_PER_S)
+        if span.start == span.stop:
+            return self._none(session_ns)
+        moved = sticks[span][-(int(WINDOW_S * rate_hz) + 1) :]
+        yawless = np.concatenate([moved, np.zeros((len(moved), 1))], axis=1)
+        rows = at_rate(np.arange(len(moved)) / rate_hz, yawless)[-WINDOW_SAMPLES:]
+        start_ns = end_ns - round((len(moved) - 1) / rate_hz * NS_PER_S)
+        return self._meaning(Motion(rows.astype(np.float32), start_ns, end_ns, len(moved)))
 
-    def _classified(self, times_s: Array, sticks: Array, start_ns: int, end_ns: int) -> Intent:
-        if float(times_s[-1]) < self._config.motion_min_s:
-            return self._none(end_ns, start_ns, len(sticks))
-        window: NDArray[np.float32] = for_model(times_s, sticks, self._config.full_stick_yaw_radps)
-        row = self._model.probabilities(window)
-        best = int(row.argmax())
-        confidence = min(1.0, float(row[best]))
-        sure = confidence >= self._config.confidence_min
+    def _meaning(self, motion: Motion) -> Intent:
+        if len(motion.sticks) < SHORTEST_SAMPLES:
+            return self._none(motion.end_ns, motion)
+        try:
+            answer = self.model.answer(motion.sticks, self._full_yaw_radps())
+        except ModelError as error:
+            self.fault = str(error)
+            return self._none(motion.end_ns, motion)
+        self.fault = ""
+        best = int(answer.probabilities.argmax())
+        confidence = min(1.0, answer.meant * float(answer.probabilities[best]))
+        least = self._config.confidence_min
+        sure = confidence >= (self.model.confidence_min if least is None else least)
+        labels = self.model.labels
         return Intent(
-            stamp=end_ns,
+            stamp=motion.end_ns,
             seq=0,
-            label=self._model.labels[best] if sure else NONE_LABEL,
-            probabilities=dict(zip(self._model.labels, map(float, row), strict=True)),
+            label=labels[best] if sure else NONE_LABEL,
+            probabilities=dict(zip(labels, answer.probabilities.tolist(), strict=True)),
             confidence=confidence,
-            window_start=start_ns,
-            window_end=end_ns,
-            samples=len(sticks),
-            model=self._model.name,
+            window_start=motion.start_ns,
+            window_end=motion.end_ns,
+            samples=motion.sources,
+            model=self.model.name,
         )
 
-    def _none(self, end_ns: int, start_ns: int | None = None, samples: int = 0) -> Intent:
+    def _full_yaw_radps(self) -> float:
+        radps = self._config.full_stick_yaw_radps
+        return FULL_STICK[self._plant].yaw_radps if radps is None else radps
+
+    def _none(self, end_ns: int, motion: Motion | None = None) -> Intent:
         """No primitive: all are equally (un)likely."""
-        labels = self._model.labels
+        labels = self.model.labels
         return Intent(
             stamp=end_ns,
             seq=0,
             label=NONE_LABEL,
             probabilities={label: 1.0 / len(labels) for label in labels},
             confidence=0.0,
-            window_start=end_ns if start_ns is None else start_ns,
+            window_start=end_ns if motion is None else motion.start_ns,
             window_end=end_ns,
-            samples=samples,
-            model=self._model.name,
+            samples=0 if motion is None else motion.sources,
+            model=self.model.name,
         )

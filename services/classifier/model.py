@@ -1,7 +1,8 @@
-"""The ONNX model: what it must look like, and its probabilities."""
+"""The ONNX model: what its file must be, and what it says of a window of sticks."""
 
 import hashlib
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -9,24 +10,62 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
+from common.messages import PRIMITIVES
 from services.classifier.window import MODEL_RATE_HZ
 
-CONTRACT = "intent-sticks/1"
+Array = NDArray[np.float64]
+Array32 = NDArray[np.float32]
+IntArray = NDArray[np.int64]
+
+CONTRACT = "intent-sticks/2"
 """Names what follows; a model made for another version is refused."""
-INPUTS = ("sticks", "lengths")
-"""(batch, time, 3) float32 vx vy vz at `MODEL_RATE_HZ`, and (batch,) int64 real samples of each."""
-OUTPUT = "probabilities"
-PRIMITIVES = ("line", "arc", "sine", "helix")
-"""The labels that the wire contract asks of every model."""
-_PROBE_SAMPLES = (50, 173)
+INPUTS = ("sticks", "times_s", "lengths", "full_yaw_radps")
+"""What is asked.
+
+sticks: (batch, time, 4) float32 vx vy vz wz as fractions of full stick, in the frame of the heading
+at each moment, at `MODEL_RATE_HZ`.
+times_s: (batch, time) float32, of each sample since its window's first.
+lengths: (batch,) int64, how many samples of each row are real; the others are its padding.
+full_yaw_radps: (batch,) float32, the vehicle's yaw rate at full stick.
+"""
+OUTPUTS = ("probabilities", "meant")
+"""What is answered.
+
+probabilities: (batch, labels) float32 of the primitives, if one is meant; each row sums to 1.
+meant: (batch,) float32, the probability that a primitive is meant at all.
+"""
+SHORTEST_SAMPLES = 20
+"""Windows from here on must be answered; a shorter one holds no shape (0.4 s)."""
+
+_WANTED_INPUTS = {
+    "sticks": ("tensor(float)", 3),
+    "times_s": ("tensor(float)", 2),
+    "lengths": ("tensor(int64)", 1),
+    "full_yaw_radps": ("tensor(float)", 1),
+}
+_PROBE_SAMPLES = (SHORTEST_SAMPLES, 173, 400)
+_PROBE_FORWARD = (0.5, 0.0)
 
 
 class ModelError(ValueError):
-    """A model file that cannot be used; the text says why and what to do."""
+    """A model file that cannot be used, or an answer that is none; the text says why."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a model says of one window.
+
+    Attributes:
+        probabilities: (labels,) of the primitives, if one is meant; they sum to 1.
+        meant: the probability that one is meant at all.
+    """
+
+    probabilities: Array
+    meant: float
 
 
 class Model(Protocol):
-    """Anything that gives probabilities to a window of sticks."""
+    """Anything that says what a window of sticks means."""
 
     @property
     def name(self) -> str:
@@ -35,23 +74,35 @@ class Model(Protocol):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The primitives it knows, in the order of its output."""
+        """The primitives it knows, in the order of its probabilities."""
         ...
 
-    def probabilities(self, sticks: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Probabilities (classes,) of sticks (N, 3) at `MODEL_RATE_HZ`; they sum to 1."""
+    @property
+    def confidence_min(self) -> float:
+        """The product of `meant` and the likeliest primitive's probability to act on."""
+        ...
+
+    def answer(self, sticks: Array32, full_yaw_radps: float) -> Answer:
+        """What sticks (N, 4) at `MODEL_RATE_HZ` mean.
+
+        Raises:
+            ModelError: if there is no answer.
+        """
         ...
 
 
 class OnnxModel:
-    """A model file in ONNX Runtime, on one thread."""
+    """A model file in ONNX Runtime, on one thread.
+
+    Args:
+        path: the file.
+
+    Raises:
+        ModelError: if there is no such file or it does not fit the contract.
+    """
 
     def __init__(self, path: Path) -> None:
-        """Load and check a file.
-
-        Raises:
-            ModelError: if there is no such file or it does not fit the contract.
-        """
+        self._path = path
         try:
             data = path.read_bytes()
         except OSError as error:
@@ -71,60 +122,106 @@ class OnnxModel:
             # ONNX Runtime raises classes of its own with no common base but Exception.
             raise ModelError(f"model {path}: no ONNX model: {str(error).splitlines()[0]}") from None
         metadata = self._session.get_modelmeta().custom_metadata_map
-        self.labels = _checked_labels(path, metadata)
-        self._check_shapes(path)
+        _check_contract(path, metadata)
+        self._check_shapes()
+        self.labels = _labels(path, metadata)
+        self.confidence_min = _confidence_min(path, metadata)
         digest = hashlib.sha256(data).hexdigest()
         self.name = f"{metadata.get('name') or path.stem}-{digest[:8]}"
-        self._probe(path)
+        self._probe()
 
-    def probabilities(self, sticks: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Probabilities (classes,) of sticks (N, 3) at `MODEL_RATE_HZ`; they sum to 1."""
-        lengths = np.array([len(sticks)], dtype=np.int64)
-        (output,) = self._session.run([OUTPUT], {INPUTS[0]: sticks[None], INPUTS[1]: lengths})
-        row = np.asarray(output[0], dtype=np.float64)
-        return np.asarray(row / row.sum())
+    def answer(self, sticks: Array32, full_yaw_radps: float) -> Answer:
+        """What sticks (N, 4) at `MODEL_RATE_HZ` mean.
 
-    def _check_shapes(self, path: Path) -> None:
-        given = {i.name: (i.type, len(i.shape)) for i in self._session.get_inputs()}
-        wanted = {INPUTS[0]: ("tensor(float)", 3), INPUTS[1]: ("tensor(int64)", 1)}
-        if given != wanted:
-            raise ModelError(f"model {path}: its inputs are {given}, not {wanted}")
-        outputs = [o.name for o in self._session.get_outputs()]
-        if outputs != [OUTPUT]:
-            raise ModelError(f"model {path}: its outputs are {outputs}, not {[OUTPUT]}")
-
-    def _probe(self, path: Path) -> None:
-        """Ask it twice: a graph with frozen axes, or one without softmax, shows at once."""
-        for samples in _PROBE_SAMPLES:
-            sticks = np.zeros((1, samples, 3), dtype=np.float32)
-            sticks[:, :, 0] = 0.5
-            feed = {INPUTS[0]: sticks, INPUTS[1]: np.array([samples], dtype=np.int64)}
-            try:
-                (output,) = self._session.run([OUTPUT], feed)
-            except Exception as error:
-                reason = str(error).splitlines()[0]
-                raise ModelError(f"model {path}: fails on {samples} samples: {reason}") from None
-            good = (
-                output.shape == (1, len(self.labels))
-                and bool(np.isfinite(output).all())
-                and bool((output >= 0.0).all())
-                and abs(float(output.sum()) - 1.0) < 1e-3
+        Raises:
+            ModelError: if the graph fails on them, or answers no probabilities.
+        """
+        probabilities, meant = self.answers(
+            sticks[None],
+            np.array([len(sticks)], dtype=np.int64),
+            np.array([full_yaw_radps], dtype=np.float32),
+        )
+        row = probabilities[0].astype(np.float64)
+        # One comparison each: whatever is NaN fails them too.
+        if not (row.min() >= 0.0 and abs(row.sum() - 1.0) < 1e-3 and 0.0 <= meant[0] <= 1.0):
+            raise ModelError(
+                f"model {self._path}: answers {row.tolist()} and {meant[0]} to {len(sticks)}"
+                " samples, which are no probabilities"
             )
-            if not good:
-                raise ModelError(
-                    f"model {path}: its output of shape {output.shape} is no set of probabilities"
-                    f" of {len(self.labels)} labels"
-                )
+        return Answer(row / row.sum(), float(meant[0]))
+
+    def answers(
+        self, sticks: Array32, lengths: IntArray, full_yaw_radps: Array32
+    ) -> tuple[Array32, Array32]:
+        """Many windows at once, as they come from the graph.
+
+        Args:
+            sticks: (batch, time, 4) at `MODEL_RATE_HZ`, padded with anything to one length.
+            lengths: (batch,) real samples of each.
+            full_yaw_radps: (batch,) of each one's vehicle.
+
+        Returns:
+            Probabilities (batch, labels) and meant (batch,).
+
+        Raises:
+            ModelError: if the graph fails on them.
+        """
+        batch, samples, _ = sticks.shape
+        times_s = np.arange(samples, dtype=np.float32) / np.float32(MODEL_RATE_HZ)
+        feed = {
+            "sticks": sticks,
+            "times_s": np.ascontiguousarray(np.broadcast_to(times_s, (batch, samples))),
+            "lengths": lengths,
+            "full_yaw_radps": full_yaw_radps,
+        }
+        try:
+            probabilities, meant = self._session.run(OUTPUTS, feed)
+        except Exception as error:
+            reason = str(error).splitlines()[0]
+            raise ModelError(f"model {self._path}: fails on {samples} samples: {reason}") from None
+        return probabilities, meant
+
+    def _check_shapes(self) -> None:
+        given = {i.name: (i.type, len(i.shape)) for i in self._session.get_inputs()}
+        if given != _WANTED_INPUTS:
+            raise ModelError(f"model {self._path}: its inputs are {given}, not {_WANTED_INPUTS}")
+        outputs = {o.name for o in self._session.get_outputs()}
+        if outputs != set(OUTPUTS):
+            raise ModelError(
+                f"model {self._path}: its outputs are {', '.join(sorted(outputs))},"
+                f" not {', '.join(OUTPUTS)}"
+            )
+
+    def _probe(self) -> None:
+        """Ask it: a graph with frozen axes, without softmax, or with 0/0 at rest shows at once."""
+        for samples in _PROBE_SAMPLES:
+            for forward in _PROBE_FORWARD:
+                sticks = np.zeros((1, samples, 4), dtype=np.float32)
+                sticks[:, :, 0] = forward
+                lengths = np.array([samples], dtype=np.int64)
+                probabilities, meant = self.answers(sticks, lengths, np.ones(1, dtype=np.float32))
+                if probabilities.shape != (1, len(self.labels)) or meant.shape != (1,):
+                    raise ModelError(
+                        f"model {self._path}: its outputs have shapes {probabilities.shape} and"
+                        f" {meant.shape}, not (1, {len(self.labels)}) and (1,)"
+                    )
+                self.answer(sticks[0], 1.0)
 
 
-def _checked_labels(path: Path, metadata: dict[str, str]) -> tuple[str, ...]:
+def _check_contract(path: Path, metadata: dict[str, str]) -> None:
     contract = metadata.get("contract")
     if contract != CONTRACT:
-        raise ModelError(f"model {path}: made for contract {contract!r}, this one is {CONTRACT!r}")
+        raise ModelError(
+            f"model {path}: made for contract {contract!r}, this one is {CONTRACT!r};"
+            " train one with 'autocomplete train'"
+        )
     if metadata.get("rate_hz") != str(MODEL_RATE_HZ):
         raise ModelError(
             f"model {path}: made for {metadata.get('rate_hz')} Hz, not {MODEL_RATE_HZ}"
         )
+
+
+def _labels(path: Path, metadata: dict[str, str]) -> tuple[str, ...]:
     try:
         labels = json.loads(metadata["labels"])
     except (KeyError, json.JSONDecodeError):
@@ -139,3 +236,16 @@ def _checked_labels(path: Path, metadata: dict[str, str]) -> tuple[str, ...]:
     if missing:
         raise ModelError(f"model {path}: its labels lack {', '.join(missing)}")
     return tuple(labels)
+
+
+def _confidence_min(path: Path, metadata: dict[str, str]) -> float:
+    text = metadata.get("confidence_min")
+    try:
+        confidence_min = float(text or "")
+    except ValueError:
+        confidence_min = float("nan")
+    if not 0.0 <= confidence_min <= 1.0:
+        raise ModelError(
+            f"model {path}: its confidence_min is {text!r}; it should be a number from 0 to 1"
+        )
+    return confidence_min

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import onnx
 import pytest
 from conftest import (
     Client,
@@ -18,6 +19,7 @@ from conftest import (
     Streams,
     assert_starts_before_its_router,
     assert_stops_without_a_router,
+    free_port,
     start_service,
 )
 from payloads import assert_bad_input_is_dropped_and_counted
@@ -103,8 +105,9 @@ def hand(service: Process, client: Client) -> Hand:
 def test_what_the_sticks_draw_is_named(hand: Hand, make: Make, label: str, after_s: float) -> None:
     intent = hand.move(make, after_s)
     assert intent["label"] == label, intent
-    assert intent["confidence"] >= 0.6
-    assert intent["confidence"] == pytest.approx(max(intent["probabilities"].values()))
+    # That a primitive is meant at all, times that it is this one.
+    assert 0.0 < intent["confidence"] <= max(intent["probabilities"].values()) + 1e-6
+    assert intent["probabilities"][label] == max(intent["probabilities"].values())
 
 
 def test_an_intent_is_as_the_contract_says(
@@ -145,7 +148,7 @@ def test_an_intent_is_as_the_contract_says(
     assert client.next("intent")["label"] == "none", "sticks that ceased mean nothing"
 
 
-@pytest.mark.parametrize("rate_hz", [25.0, 50.0, 100.0])
+@pytest.mark.parametrize("rate_hz", [20.0, 50.0, 100.0])
 def test_the_window_is_four_seconds_whatever_the_rate(hand: Hand, rate_hz: float) -> None:
     intent = hand.move(arc, 4.6, rate_hz)
     assert intent["label"] == "arc"
@@ -164,8 +167,10 @@ def test_no_motion_is_no_primitive(hand: Hand, make: Make) -> None:
     assert sum(intent["probabilities"].values()) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_motion_of_half_a_second_has_no_shape_yet(hand: Hand) -> None:
-    assert hand.move(line, 0.5)["label"] == "none"
+def test_a_motion_of_a_third_of_a_second_has_no_shape_yet(hand: Hand) -> None:
+    intent = hand.move(line, 0.34)
+    assert intent["label"] == "none"
+    assert intent["confidence"] == 0.0
 
 
 def test_a_pause_ends_the_motion(hand: Hand) -> None:
@@ -204,7 +209,7 @@ def test_the_default_period_is_the_thesis_second(router: Any, port: int, tmp_pat
 
 def test_given_samples_are_classified(service: Process, client: Client) -> None:
     for make, label in ((line, "line"), (arc, "arc"), (sine, "sine"), (helix, "helix")):
-        for rate in (25.0, 50.0, 100.0):
+        for rate in (20.0, 50.0, 100.0):
             times = [n / rate for n in range(int(3.6 * rate))]
             samples = [[make(t)[axis] for axis in ("vx", "vy", "vz")] for t in times]
             good, intent = client.ask("classifier/classify", {"samples": samples, "rate": rate})
@@ -234,7 +239,8 @@ def test_given_samples_are_classified(service: Process, client: Client) -> None:
         ({"samples": [[float("nan"), 0.0, 0.0]] * 60, "rate": 50.0}, None),
         ({"samples": [[3.0, 0.0, 0.0]] * 60, "rate": 50.0}, "samples"),
         ({"samples": [[0.5, 0.0, 0.0]] * 60, "rate": 0.0}, "rate"),
-        ({"samples": [[0.5, 0.0, 0.0]] * 60, "rate": 1.0}, "rate"),
+        ({"samples": [[0.5, 0.0, 0.0]] * 60, "rate": 19.0}, "rate"),
+        ({"samples": [[0.5, 0.0, 0.0]] * 60, "rate": 101.0}, "rate"),
         ({"samples": [[0.5, 0.0, 0.0]] * 60, "rate": "fast"}, "rate"),
         ([1, 2], None),
         (b"\xc1 noise", None),
@@ -262,26 +268,101 @@ def test_it_stops_without_a_router(tmp_path: Path) -> None:
     assert_stops_without_a_router("classifier", tmp_path=tmp_path)
 
 
-@pytest.mark.parametrize("content", [None, b"no model at all"], ids=["no file", "no model"])
-def test_a_model_that_does_not_fit_is_refused_in_one_line(
-    router: Any, port: int, tmp_path: Path, content: bytes | None
+SHIPPED = Path(__file__).parents[2] / "models" / "intent.onnx"
+
+
+def variant(path: Path, **metadata: str) -> Path:
+    """The shipped model with other words in its metadata."""
+    model = onnx.load(str(SHIPPED))
+    given = {entry.key: entry.value for entry in model.metadata_props}
+    onnx.helper.set_model_props(model, {**given, **metadata})
+    onnx.save(model, str(path))
+    return path
+
+
+def put_in_place(path: Path, made: Path) -> None:
+    """As the documentation says: write it beside the other, then rename."""
+    made.replace(path)
+
+
+def test_a_model_file_is_exchanged_while_it_runs(router: Any, port: int, tmp_path: Path) -> None:
+    path = variant(tmp_path / "m.onnx", name="first")
+    client = Client(port, "reload")
+    process = Process(
+        port,
+        "reload",
+        "classifier",
+        ["--model", str(path), "--period-s", str(PERIOD_S)],
+        tmp_path / "reload.log",
+    )
+    with contextlib.closing(client):
+        try:
+            client.wait_alive("classifier")
+            intents = client.collect("intent")
+            assert client.next("intent")["model"].startswith("first-")
+
+            put_in_place(path, variant(tmp_path / "new", name="second"))
+            client.next("intent", lambda i: i["model"].startswith("second-"))
+
+            path.write_bytes(b"no model at all")
+            health = client.next("health/classifier", lambda h: h["state"] == "degraded")
+            assert "m.onnx" in health["detail"]
+            assert "second-" in health["detail"]
+            assert client.next("intent")["model"].startswith("second-")
+
+            put_in_place(path, variant(tmp_path / "new", name="third", contract="intent-sticks/1"))
+            client.next("health/classifier", lambda h: "intent-sticks/1" in h["detail"])
+            assert client.next("intent")["model"].startswith("second-")
+
+            put_in_place(path, variant(tmp_path / "new", name="fourth"))
+            client.next("intent", lambda i: i["model"].startswith("fourth-"))
+            health = client.next("health/classifier", lambda h: h["state"] == "ok")
+            assert health["detail"].startswith("fourth-")
+
+            gaps_s = [b - a for a, b in itertools.pairwise(intents.arrival_s)]
+            assert max(gaps_s) < 3.0 * PERIOD_S, "a period was missed"
+            seqs = [i["seq"] for i in intents]
+            assert seqs == list(range(seqs[0], seqs[0] + len(seqs)))
+            assert process.stop() == 0
+        finally:
+            if process.popen.poll() is None:
+                process.popen.kill()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason", "with_router"),
+    [
+        (lambda path: None, "cannot be read", False),
+        (lambda path: path.write_bytes(b"no model at all"), "no ONNX model", False),
+        (lambda path: variant(path, contract="intent-sticks/1"), "intent-sticks/1", False),
+        (lambda path: variant(path, contract="intent-sticks/1"), "intent-sticks/1", True),
+    ],
+    ids=["no file", "no model", "other contract", "other contract, with a router"],
+)
+def test_a_model_that_does_not_fit_is_refused_at_start_in_one_line(
+    router: Any,
+    port: int,
+    tmp_path: Path,
+    spoil: Callable[[Path], object],
+    reason: str,
+    with_router: bool,
 ) -> None:
     path = tmp_path / "other.onnx"
-    if content is not None:
-        path.write_bytes(content)
+    spoil(path)
     ran = subprocess.run(
         [
             str(Path(sys.executable).with_name("autocomplete")),
             *("run", "classifier", "--model", str(path)),
-            *("--connect", f"tcp/127.0.0.1:{port}", "--vehicle", "refused"),
+            *("--connect", f"tcp/127.0.0.1:{port if with_router else free_port()}"),
+            *("--vehicle", "refused"),
         ],
         capture_output=True,
         text=True,
         timeout=30,
     )
-    assert ran.returncode in (1, 2)
-    errors = [text for text in ran.stderr.splitlines() if "other.onnx" in text]
-    assert len(errors) == 1
+    assert ran.returncode == 1
+    (error,) = (text for text in ran.stderr.splitlines() if "other.onnx" in text)
+    assert reason in error
     assert "Traceback" not in ran.stderr
 
 

@@ -1,66 +1,28 @@
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import onnx
 import pytest
+from classifier_models import GOOD, write_model
 
+from common.messages import PRIMITIVES
 from services.classifier.config import SHIPPED_MODEL
-from services.classifier.model import CONTRACT, PRIMITIVES, ModelError, OnnxModel
-from services.classifier.window import WINDOW_SAMPLES, for_model
-
-GOOD = {"contract": CONTRACT, "labels": '["line", "arc", "sine", "helix"]', "rate_hz": "50.0"}
-
-
-def write_model(
-    path: Path,
-    *,
-    metadata: dict[str, str] = GOOD,
-    inputs: tuple[str, str] = ("sticks", "lengths"),
-    output: str = "probabilities",
-    time_axis: int | str = "time",
-    classes: int = 4,
-    softmax: bool = True,
-) -> Path:
-    """A model that answers a constant, as right or wrong as asked."""
-    make = onnx.helper
-    kinds = onnx.TensorProto
-    nodes = [
-        make.make_node("ReduceMean", [inputs[0]], ["mean"], axes=[1, 2], keepdims=0),
-        make.make_node("Unsqueeze", ["mean", "one"], ["column"]),
-        make.make_node("MatMul", ["column", "weights"], ["logits"]),
-        make.make_node("Cast", [inputs[1]], ["unused"], to=kinds.FLOAT),
-        make.make_node("Softmax", ["logits"], [output], axis=1)
-        if softmax
-        else make.make_node("Add", ["logits", "weights"], [output]),
-    ]
-    graph = make.make_graph(
-        nodes,
-        "constant",
-        [
-            make.make_tensor_value_info(inputs[0], kinds.FLOAT, ["batch", time_axis, 3]),
-            make.make_tensor_value_info(inputs[1], kinds.INT64, ["batch"]),
-        ],
-        [make.make_tensor_value_info(output, kinds.FLOAT, ["batch", classes])],
-        [
-            make.make_tensor("one", kinds.INT64, [1], [1]),
-            make.make_tensor("weights", kinds.FLOAT, [1, classes], [0.5] * classes),
-        ],
-    )
-    model = make.make_model(graph, opset_imports=[make.make_opsetid("", 17)], ir_version=8)
-    onnx.helper.set_model_props(model, metadata)
-    onnx.save(model, str(path))
-    return path
+from services.classifier.model import SHORTEST_SAMPLES, ModelError, OnnxModel
 
 
 def test_a_model_that_fits_is_taken_with_its_name_and_hash(tmp_path: Path) -> None:
     model = OnnxModel(write_model(tmp_path / "small.onnx"))
     assert model.labels == PRIMITIVES
+    assert model.confidence_min == 0.6
     name, _, digest = model.name.rpartition("-")
     assert name == "small"
     assert len(digest) == 8
-    assert model.probabilities(np.zeros((30, 3), dtype=np.float32)).sum() == pytest.approx(1.0)
+    answer = model.answer(np.ones((30, 4), dtype=np.float32), 1.0)
+    assert answer.probabilities.sum() == pytest.approx(1.0, abs=1e-12)
+    assert answer.probabilities.argmax() == 1
+    assert answer.meant == pytest.approx(0.9)
 
 
 def test_more_primitives_than_the_four_are_welcome(tmp_path: Path) -> None:
@@ -73,20 +35,27 @@ def test_more_primitives_than_the_four_are_welcome(tmp_path: Path) -> None:
     ("spoiled", "reason"),
     [
         ({"metadata": {}}, "contract"),
-        ({"metadata": {**GOOD, "contract": "intent-sticks/9"}}, "contract"),
+        ({"metadata": {**GOOD, "contract": "intent-sticks/1"}}, "contract"),
         ({"metadata": {**GOOD, "rate_hz": "45.0"}}, "Hz"),
         ({"metadata": {**GOOD, "labels": "line"}}, "labels"),
         ({"metadata": {**GOOD, "labels": "[1, 2]"}}, "labels"),
         ({"metadata": {**GOOD, "labels": '["line", "arc", "sine"]'}, "classes": 3}, "helix"),
-        ({"inputs": ("x", "lengths")}, "inputs"),
-        ({"output": "logits_"}, "outputs"),
+        ({"metadata": {k: v for k, v in GOOD.items() if k != "confidence_min"}}, "confidence_min"),
+        ({"metadata": {**GOOD, "confidence_min": "sure"}}, "confidence_min"),
+        ({"metadata": {**GOOD, "confidence_min": "nan"}}, "confidence_min"),
+        ({"metadata": {**GOOD, "confidence_min": "1.2"}}, "confidence_min"),
+        ({"sticks": "x"}, "inputs"),
+        ({"meant": "sure"}, "outputs"),
         ({"time_axis": 200}, "fails on"),
-        ({"classes": 5}, "no set of probabilities"),
-        ({"softmax": False}, "no set of probabilities"),
+        ({"classes": 5}, "shapes"),
+        ({"softmax": False}, "no probabilities"),
+        ({"meant_value": 1.5}, "no probabilities"),
+        ({"meant_of_rest": float("nan")}, "no probabilities"),
+        ({"logits": (float("nan"), 0.0, 0.0, 0.0)}, "no probabilities"),
     ],
 )
 def test_a_model_that_does_not_fit_is_refused_with_the_reason(
-    tmp_path: Path, spoiled: dict, reason: str
+    tmp_path: Path, spoiled: dict[str, Any], reason: str
 ) -> None:
     path = write_model(tmp_path / "m.onnx", **spoiled)
     with pytest.raises(ModelError, match=reason) as refused:
@@ -110,9 +79,11 @@ def shipped() -> OnnxModel:
 
 
 def said_of(model: OnnxModel, vx: np.ndarray, vy: np.ndarray, vz: np.ndarray) -> str:
-    times_s = np.arange(len(vx)) / 50.0
-    sticks = np.stack([vx, vy, vz, np.zeros_like(vx)], axis=1)
-    return model.labels[int(model.probabilities(for_model(times_s, sticks, 1.0)).argmax())]
+    sticks = np.stack([vx, vy, vz, np.zeros_like(vx)], axis=1).astype(np.float32)
+    answer = model.answer(sticks, 1.0)
+    best = int(answer.probabilities.argmax())
+    assert answer.meant * answer.probabilities[best] >= model.confidence_min
+    return model.labels[best]
 
 
 @pytest.mark.parametrize("heading", np.linspace(-3.0, 3.0, 7))
@@ -146,16 +117,25 @@ def test_the_shipped_model_takes_a_wide_slow_turn_for_an_arc(shipped: OnnxModel)
     assert said_of(shipped, 0.8 * np.cos(angle), 0.8 * np.sin(angle), 0.0 * angle) == "arc"
 
 
-def test_padding_changes_nothing(shipped: OnnxModel) -> None:
+def test_the_shipped_model_sees_a_curve_that_is_flown_by_yaw(shipped: OnnxModel) -> None:
+    sticks = np.tile(np.array([0.8, 0.0, 0.0, 0.5], dtype=np.float32), (150, 1))
+    answer = shipped.answer(sticks, 1.0)
+    assert shipped.labels[int(answer.probabilities.argmax())] == "arc"
+    slower = shipped.answer(sticks, 0.0)
+    assert shipped.labels[int(slower.probabilities.argmax())] == "line"
+
+
+def test_many_windows_at_once_are_answered_as_one_by_one(shipped: OnnxModel) -> None:
+    """Whatever they are padded with."""
     rng = np.random.default_rng(0)
-    for length in (20, 41, 100, 151):
-        sticks = rng.uniform(-1.0, 1.0, (length, 3)).astype(np.float32)
-        padded = np.zeros((1, WINDOW_SAMPLES, 3), dtype=np.float32)
-        padded[0, :length] = sticks
-        (output,) = shipped._session.run(
-            None, {"sticks": padded, "lengths": np.array([length], dtype=np.int64)}
-        )
-        assert output[0] == pytest.approx(shipped.probabilities(sticks), abs=1e-5)
+    lengths = np.array([SHORTEST_SAMPLES, 41, 100, 151, 200])
+    sticks = rng.uniform(-1.0, 1.0, (len(lengths), lengths.max(), 4)).astype(np.float32)
+    yaw_radps = np.linspace(0.5, 1.5, len(lengths)).astype(np.float32)
+    probabilities, meant = shipped.answers(sticks, lengths, yaw_radps)
+    for row, length in enumerate(lengths):
+        alone = shipped.answer(np.ascontiguousarray(sticks[row, :length]), float(yaw_radps[row]))
+        assert probabilities[row] == pytest.approx(alone.probabilities, abs=1e-5)
+        assert meant[row] == pytest.approx(alone.meant, abs=1e-5)
 
 
 def test_a_service_needs_neither_torch_nor_sklearn() -> None:
