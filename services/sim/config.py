@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import worlds
-
-PLANTS = ("tum",)
-"""The plants that are built."""
+from common.messages import Plant
+from services.sim.plants import PLANTS
 
 
 @dataclass(frozen=True)
@@ -15,10 +14,28 @@ class Config:
 
     world: str = "track"
     """Where it starts: one of the files under worlds/."""
-    plant: str = "tum"
+    plant: Plant = "tum"
     """How the vehicle follows the stick."""
     seed: int = 0
     """Of all noise; the same seed and commands give the same flight."""
+    clock: Literal["real", "lockstep"] = "real"
+    """Real time, or steps that wait for the command of each 20 ms."""
+    wind_mps: float = 0.0
+    """Its steady part, 6 m above ground."""
+    wind_from_deg: float = 270.0
+    """Where it blows from, clockwise from north (+y): 270 is a west wind, along +x."""
+    gusts: bool = True
+    """Whether wind gusts (Dryden)."""
+    battery: float = 1.0
+    """What it starts with, 0 to 1."""
+    ceiling_m: float = 30.0
+    """It climbs no higher; the AR.Drone's driver has 4 m."""
+    command_delay_s: float = 0.0
+    """From a command's arrival to its effect; tum_ardrone reckons with 0.1 s."""
+    sensor_delay_s: float = 0.0
+    """From a sample to its message; tum_ardrone reckons with 0.04 s."""
+    video_delay_s: float = 0.0
+    """From a picture to its message; tum_ardrone reckons with 0.075 s."""
     command_noise: float = 1.0
     """Scale of the plant's noise on the sticks; 0 is none."""
     sensor_noise: float = 1.0
@@ -48,12 +65,23 @@ class Config:
         if self.world not in worlds.names():
             raise ValueError(f"world: no {self.world!r}; there are {', '.join(worlds.names())}")
         if self.plant not in PLANTS:
-            raise ValueError(f"plant: no {self.plant!r}; there is {', '.join(PLANTS)}")
+            raise ValueError(f"plant: no {self.plant!r}; there are {', '.join(PLANTS)}")
         if self.seed < 0:
             raise ValueError("seed: must be 0 or more")
         for name in ("command_noise", "sensor_noise"):
             if not 0.0 <= getattr(self, name) <= 10.0:
                 raise ValueError(f"{name}: must lie in 0..10")
+        if not 0.0 <= self.wind_mps <= 20.0:
+            raise ValueError("wind_mps: must lie in 0..20")
+        if not -360.0 <= self.wind_from_deg <= 360.0:
+            raise ValueError("wind_from_deg: must lie in -360..360")
+        if not 0.0 < self.battery <= 1.0:
+            raise ValueError("battery: must lie above 0 and not above 1")
+        if not 1.0 <= self.ceiling_m <= 100.0:
+            raise ValueError("ceiling_m: must lie in 1..100")
+        for name in ("command_delay_s", "sensor_delay_s", "video_delay_s"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"{name}: must lie in 0..1")
         for name in ("front_width", "front_height", "down_width", "down_height"):
             if not 16 <= getattr(self, name) <= 4096:
                 raise ValueError(f"{name}: must lie in 16..4096 pixels")

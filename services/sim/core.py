@@ -4,8 +4,10 @@ The same seed and the same commands at the same steps give the same messages.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 import worlds
@@ -14,14 +16,20 @@ from common.camera import DOWN, FRONT, Lens, Mount
 from common.clock import NS_PER_S
 from common.topics import TOPICS
 from services.sim import sensors
-from services.sim.config import PLANTS, Config
-from services.sim.plant import BodyState, Quaternion, TumPlant, Vector3
-from services.sim.stage import REST_HEIGHT_M, Scene, Stage
+from services.sim.body import CALM, REST_HEIGHT_M, BodyState, Quaternion, Vector3
+from services.sim.config import Config
+from services.sim.delay import Delay
+from services.sim.plants import PLANTS
+from services.sim.stage import Scene, Stage, Touch
 from services.sim.vehicle import StickNoise, Vehicle
+from services.sim.wind import STEP_S as WIND_STEP_S
+from services.sim.wind import Wind
 
-PHYSICS_HZ = 600
-"""A multiple of every sensor's rate (200, 100, 60, 30, 25 Hz), so that samples fall on steps."""
+PHYSICS_HZ = 200
+"""The rate of the IMU, and a multiple of the other instruments'; pictures may fall between steps.
+The fastest loop of a plant has 20 ms, and is integrated as the step responses in the tests say."""
 STEP_S = 1.0 / PHYSICS_HZ
+STEP_NS = NS_PER_S // PHYSICS_HZ
 
 MAX_COORDINATE_M = 1000.0
 MAX_HEIGHT_M = 100.0
@@ -60,12 +68,11 @@ class Shot:
     orientation: Quaternion
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(msgspec.Struct, frozen=True, gc=False):
     """What one step brought: messages by topic, and pictures to take."""
 
-    messages: tuple[tuple[str, m.Message], ...]
-    shots: tuple[Shot, ...]
+    messages: Sequence[tuple[str, m.Message]]
+    shots: Sequence[Shot]
 
 
 class ResetError(ValueError):
@@ -89,22 +96,39 @@ def cameras_of(config: Config) -> tuple[Camera, ...]:
     )
 
 
-class _Schedule:
-    """Which steps a rate falls on; `phase` shifts it by a part of its period."""
+class _Shutter:
+    """When a camera takes pictures: `fps` a second, the first after `phase` of a period."""
 
-    def __init__(self, rate_hz: float, phase: float = 0.0) -> None:
-        self._per_step = rate_hz / PHYSICS_HZ
+    def __init__(self, topic: str, fps: float, phase: float) -> None:
+        self.topic = topic
+        self._period_steps = PHYSICS_HZ / fps
         self._phase = phase
+        self._taken = 0
+        self.next_step = self._at()
 
-    def due(self, count: int) -> bool:
-        now = math.floor(count * self._per_step + self._phase + 1e-9)
-        return now > math.floor((count - 1) * self._per_step + self._phase + 1e-9)
+    def released(self) -> None:
+        """The picture of `next_step` is taken."""
+        self._taken += 1
+        self.next_step = self._at()
+
+    def _at(self) -> float:
+        # Rounded, so that a picture meant for a step does not miss it by a last bit.
+        return round((self._taken + 1 - self._phase) * self._period_steps, 9)
 
 
-def _rate_of(topic: str) -> float:
+def _every(topic: str) -> int:
+    """The steps from one message of an instrument to its next."""
     rate_hz = TOPICS[topic].rate_hz
     assert rate_hz is not None
-    return rate_hz
+    steps = PHYSICS_HZ / rate_hz
+    assert steps == int(steps)
+    return int(steps)
+
+
+_TRUTH_EVERY = _every("truth")
+_ALTIMETER_EVERY = _every("altimeter")
+_STATUS_EVERY = _every("vehicle")
+_WIND_EVERY = round(WIND_STEP_S * PHYSICS_HZ)
 
 
 class Simulation:
@@ -115,21 +139,25 @@ class Simulation:
         start_ns: the stamp of step 0; step n is stamped n / PHYSICS_HZ later.
     """
 
+    _vehicle: Vehicle
+    _state: BodyState
+    _touch: Touch
+    _below_m: float
+    _air_mps: Vector3
+
     def __init__(self, config: Config, start_ns: int = 0) -> None:
         self._config = config
         self._start_ns = start_ns
         self._count = 0
         self._told: tuple[str, int] | None = None
-        self._imu_due = _Schedule(_rate_of("imu"))
-        self._truth_due = _Schedule(_rate_of("truth"))
-        self._altimeter_due = _Schedule(_rate_of("altimeter"))
-        self._status_due = _Schedule(_rate_of("vehicle"))
         # Half a period apart, so that the two cameras do not ask for the renderer at once.
-        self._cameras_due = tuple(
-            (camera.topic, _Schedule(camera.fps, phase))
+        self._shutters = [
+            _Shutter(camera.topic, camera.fps, phase)
             for camera, phase in zip(cameras_of(config), (0.0, 0.5), strict=True)
-        )
+            if config.renderer != "none"
+        ]
         self._world = worlds.load(config.world)
+        self._plant: m.Plant = config.plant
         self._seed = config.seed
         self._position_m = self._world.start_position_m
         self._yaw_rad = self._world.start_yaw_rad
@@ -139,7 +167,7 @@ class Simulation:
     @property
     def now_ns(self) -> int:
         """The stamp of the last step."""
-        return self._start_ns + self._count * NS_PER_S // PHYSICS_HZ
+        return self._start_ns + self._count * STEP_NS
 
     @property
     def world(self) -> str:
@@ -163,7 +191,7 @@ class Simulation:
             state=self._vehicle.state,
             battery=self._vehicle.battery,
             world=self._world.name,
-            plant="tum",
+            plant=self._plant,
             collisions=self._vehicle.collisions,
         )
 
@@ -173,29 +201,34 @@ class Simulation:
         Args:
             command: what has arrived since the last step, if anything.
         """
-        loads = self._vehicle.control(command, self._state, self._touch, self._below_m)
-        self._stage.step(loads)
-        self._count += 1
-        self._look()
+        count = self._count
+        command = self._command_link.step(command)
+        if self._wind is not None and count % _WIND_EVERY == 0:
+            self._air_mps = self._wind.step(self._state.position_m, self._state.velocity_mps)
+        was = self._state
+        loads = self._vehicle.control(command, was, self._touch, self._below_m, self._air_mps)
+        self._stage.step(loads, was)
+        self._count = count = count + 1
+        self._state = state = self._stage.state()
+        self._touch = self._stage.touch(state)
 
-        count, now_ns, state = self._count, self.now_ns, self._state
-        messages: list[tuple[str, m.Message]] = []
-        if self._imu_due.due(count):
-            messages.append(("imu", self._imu.sample(now_ns, state)))
-        if self._truth_due.due(count):
-            messages.append(("truth", sensors.truth(now_ns, state)))
-        if self._altimeter_due.due(count):
-            messages.append(("altimeter", self._altimeter.sample(now_ns, self._below_m)))
+        now_ns = self.now_ns
+        told: list[tuple[str, m.Message]] = [("imu", self._imu.sample(now_ns, state))]
+        if count % _ALTIMETER_EVERY == 0:
+            told.append(("altimeter", self._altimeter.sample(now_ns, self._look_down())))
+        elif self._vehicle.state != "flying":
+            self._look_down()
         news = (self._vehicle.state, self._vehicle.collisions)
-        if news != self._told or self._status_due.due(count):
+        if news != self._told or count % _STATUS_EVERY == 0:
             self._told = news
-            messages.append(("vehicle", self.status()))
-        shots = tuple(
-            Shot(topic, now_ns, state.position_m, state.orientation)
-            for topic, schedule in self._cameras_due
-            if schedule.due(count)
-        )
-        return Step(tuple(messages), shots)
+            told.append(("vehicle", self.status()))
+        messages = self._sensor_link.step(told)
+        if count % _TRUTH_EVERY == 0:
+            messages = [*messages, ("truth", sensors.truth(now_ns, state))]
+        shots = [
+            self._shot(shutter, was) for shutter in self._shutters if shutter.next_step <= count
+        ]
+        return Step(messages, self._video_link.step(shots))
 
     def reset(self, request: m.ResetRequest) -> m.VehicleStatus:
         """Start anew in place; stamps go on.
@@ -205,8 +238,13 @@ class Simulation:
         Raises:
             ResetError: if the request cannot be granted; then nothing has changed.
         """
-        if request.plant is not None and request.plant not in PLANTS:
-            raise ResetError("plant", f"no plant {request.plant!r}; there is {', '.join(PLANTS)}")
+        plant = self._plant
+        if request.plant is not None:
+            if request.plant not in PLANTS:
+                raise ResetError(
+                    "plant", f"no plant {request.plant!r}; there are {', '.join(PLANTS)}"
+                )
+            plant = PLANTS[request.plant].name
         position_m, yaw_rad = self._position_m, self._yaw_rad
         world = self._world
         if request.world is not None and request.world != world.name:
@@ -237,6 +275,7 @@ class Simulation:
         if stage is not self._stage:
             self._stage.close()
         self._stage, self._world = stage, world
+        self._plant = plant
         self._position_m, self._yaw_rad = position_m, yaw_rad
         self._seed = self._seed if request.seed is None else request.seed
         self._restart()
@@ -247,28 +286,75 @@ class Simulation:
         self._stage.close()
 
     def _restart(self) -> None:
-        command, imu, altimeter = (
-            np.random.default_rng(child) for child in np.random.SeedSequence(self._seed).spawn(3)
+        config = self._config
+        command, imu, altimeter, gusts = (
+            np.random.default_rng(child) for child in np.random.SeedSequence(self._seed).spawn(4)
         )
         self._stage.place(_above_ground(self._position_m), self._yaw_rad)
-        scale = self._config.sensor_noise
-        self._imu = sensors.Imu(imu, scale, 1.0 / _rate_of("imu"))
-        self._altimeter = sensors.Altimeter(altimeter, scale)
-        self._look()
+        self._imu = sensors.Imu(imu, config.sensor_noise, STEP_S)
+        self._altimeter = sensors.Altimeter(altimeter, config.sensor_noise)
+        self._wind = (
+            Wind(gusts, config.wind_mps, config.wind_from_deg, config.gusts)
+            if config.wind_mps > 0.0
+            else None
+        )
+        self._air_mps = CALM
+        self._state = self._stage.state()
+        self._touch = self._stage.touch(self._state)
+        self._look_down()
+        plant = PLANTS[self._plant]
+        scale = config.command_noise
         self._vehicle = Vehicle(
-            TumPlant(STEP_S),
-            StickNoise(command, self._config.command_noise, STEP_S),
+            plant(STEP_S),
+            StickNoise(command, scale * plant.noise, scale * plant.drift, STEP_S),
             STEP_S,
             flying=self._below_m > REST_HEIGHT_M + IN_THE_AIR_M,
+            battery=config.battery,
+            ceiling_m=config.ceiling_m,
         )
         self._told = None
+        self._command_link: Delay[m.Command | None] = Delay(_steps(config.command_delay_s), None)
+        self._sensor_link: Delay[list[tuple[str, m.Message]]] = Delay(
+            _steps(config.sensor_delay_s), []
+        )
+        self._video_link: Delay[list[Shot]] = Delay(_steps(config.video_delay_s), [])
 
-    def _look(self) -> None:
-        self._state = self._stage.state()
-        self._touch = self._stage.touch()
-        self._below_m = self._stage.range_below(self._state, sensors.RANGE_MAX_M)
+    def _look_down(self) -> float:
+        """What the altimeter would measure; notes what is right below."""
+        ranges_m = self._stage.ranges(
+            self._state.position_m, sensors.cone(self._state), sensors.RANGE_MAX_M
+        )
+        self._below_m = ranges_m[0]
+        return min(ranges_m)
+
+    def _shot(self, shutter: _Shutter, was: BodyState) -> Shot:
+        """The picture that fell into the step that led from `was` to the present state."""
+        now, share = self._state, shutter.next_step - (self._count - 1)
+        stamp_ns = self._start_ns + int(shutter.next_step * STEP_NS)
+        shutter.released()
+        # Within a step the body moves on at a constant velocity.
+        (x0, y0, z0), (x1, y1, z1) = was.position_m, now.position_m
+        left = 1.0 - share
+        position_m = (left * x0 + share * x1, left * y0 + share * y1, left * z0 + share * z1)
+        turn = quaternion_between(was.orientation, now.orientation, share)
+        return Shot(shutter.topic, stamp_ns, position_m, turn)
+
+
+def _steps(duration_s: float) -> int:
+    return round(duration_s * PHYSICS_HZ)
 
 
 def _above_ground(position_m: Vector3) -> Vector3:
     x, y, z = position_m
     return (x, y, max(z, REST_HEIGHT_M))
+
+
+def quaternion_between(begin: Quaternion, end: Quaternion, share: float) -> Quaternion:
+    """The turn at a share of the way between two that are close together."""
+    (x0, y0, z0, w0), (x1, y1, z1, w1) = begin, end
+    near = share if x0 * x1 + y0 * y1 + z0 * z1 + w0 * w1 >= 0.0 else -share
+    left = 1.0 - share
+    x, y = left * x0 + near * x1, left * y0 + near * y1
+    z, w = left * z0 + near * z1, left * w0 + near * w1
+    norm = math.sqrt(x * x + y * y + z * z + w * w)
+    return (x / norm, y / norm, z / norm, w / norm)

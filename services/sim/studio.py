@@ -3,7 +3,7 @@
 import logging
 import threading
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal, Protocol
 
 import cv2
@@ -112,7 +112,7 @@ class Studio:
             self._shots.clear()
             self._wake.notify()
 
-    def take(self, shots: tuple[Shot, ...]) -> None:
+    def take(self, shots: Sequence[Shot]) -> None:
         """Have pictures taken soon, or not at all if newer ones are asked for first."""
         with self._wake:
             for shot in shots:

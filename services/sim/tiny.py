@@ -11,7 +11,7 @@ import pybullet
 from common.camera import Lens
 from services.sim.core import Camera, Shot
 from services.sim.renderer import FAR_M, view_of
-from services.sim.stage import Scene, add_body
+from services.sim.stage import Scene, add_visible
 from services.sim.textures import Picture, paint
 from worlds import Texture
 
@@ -38,9 +38,7 @@ class TinyRenderer:
             if body.texture not in colours:
                 mean = paint(body.texture).picture.reshape(-1, 4).mean(axis=0) / 255.0
                 colours[body.texture] = (*mean[:3], 1.0)
-            pybullet.changeVisualShape(
-                add_body(body, **self._on), -1, rgbaColor=colours[body.texture], **self._on
-            )
+            add_visible(body, colours[body.texture], **self._on)
         half = GROUND_SIDE_M / 2.0
         ground = pybullet.createVisualShape(
             pybullet.GEOM_BOX, halfExtents=(half, half, 0.01), **self._on

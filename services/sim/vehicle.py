@@ -1,69 +1,77 @@
-"""The vehicle: its states from landed to flying, the watchdog on commands, noise, collisions."""
+"""The vehicle: its states from landed to flying, the watchdog on commands, battery, collisions."""
 
 import numpy as np
 
 from common.messages import Command, VehicleState
 from common.topics import TOPICS
-from services.sim.plant import NO_LOADS, BodyState, Loads, Sticks, TumPlant
-from services.sim.stage import Touch, tilt_of
+from services.sim.body import WEIGHT_N, BodyState, Loads, Sticks, Vector3
+from services.sim.plants.plant import Plant
+from services.sim.stage import Touch
 
 WATCHDOG_S = TOPICS["command"].max_age_s
 """A command older than this is worthless: the vehicle hovers."""
 
-# Take-off and landing of tum_simulator a020d89. It stops its rotors 0.2 m up or after 5 s of
-# landing; here they stop on touching down, since a real drone is not dropped.
-TAKE_OFF_LIFT = 1.5
 TAKE_OFF_HEIGHT_M = 0.5
-LANDING_LIFT = 0.8
+"""Here a take-off is over (tum_simulator a020d89). It stops its rotors 0.2 m up or after 5 s of
+landing; here they stop on touching down, since a real drone is not dropped."""
 
 CAPSIZED_RAD = 1.4
 """Tilted beyond this the rotors stop, as the real drone's do."""
 STILL_MPS = 0.05
 COLLISION_GAP_S = 0.25
 """A contact is a new collision after this long without one: a scrape along a fence is one."""
-BATTERY_LIFE_S = 12 * 60.0
-"""Of flight."""
+
+HOVER_LIFE_S = 12 * 60.0
+"""What the AR.Drone's maker states for one charge. A rotor's power grows as thrust^1.5."""
+BATTERY_LOW = 0.05
+"""With less left it lands by itself and takes off no more; with nothing left the rotors stop."""
 
 _NOISE_STEP_S = 0.02
-_NOISE = 0.05
 _DRIFT_STEP_S = 5.0
-_DRIFT = 0.03
+_NEUTRAL = Sticks()
 
 
 class StickNoise:
-    """tum_simulator's noise on commands: uniform +-0.05, and a drift +-0.03 redrawn every 5 s.
+    """Noise on commands as tum_simulator's: uniform, and a drift redrawn every 5 s.
 
     The uniform part is redrawn at 50 Hz, the rate of commands.
+
+    Args:
+        generator: of the noise.
+        noise: uniform within +-this.
+        drift: the same.
+        step_s: of physics.
     """
 
-    def __init__(self, generator: np.random.Generator, scale: float, step_s: float) -> None:
+    def __init__(
+        self, generator: np.random.Generator, noise: float, drift: float, step_s: float
+    ) -> None:
         self._generator = generator
-        self._scale = scale
+        self._limits = (noise, drift)
         self._every = round(_NOISE_STEP_S / step_s)
-        self._drift_every = round(_DRIFT_STEP_S / step_s)
+        self._blocks = round(_DRIFT_STEP_S / _NOISE_STEP_S)
+        self._waiting: list[list[float]] = []
         self._count = 0
-        self._noise = self._drift = [0.0] * 4
+        self._offset = [0.0] * 4
 
     def add_to(self, sticks: Sticks) -> Sticks:
         """The sticks that the plant gets, one step later."""
-        if self._scale == 0.0:
+        if self._limits == (0.0, 0.0):
             return sticks
-        if self._count % self._drift_every == 0:
-            self._drift = self._draw(_DRIFT)
         if self._count % self._every == 0:
-            self._noise = self._draw(_NOISE)
+            if not self._waiting:
+                self._waiting = self._draw()
+            self._offset = self._waiting.pop()
         self._count += 1
-        noise, drift = self._noise, self._drift
-        return Sticks(
-            sticks.vx + noise[0] + drift[0],
-            sticks.vy + noise[1] + drift[1],
-            sticks.vz + noise[2] + drift[2],
-            sticks.wz + noise[3] + drift[3],
-        )
+        vx, vy, vz, wz = self._offset
+        return Sticks(sticks.vx + vx, sticks.vy + vy, sticks.vz + vz, sticks.wz + wz)
 
-    def _draw(self, amplitude: float) -> list[float]:
-        limit = amplitude * self._scale
-        return [float(each) for each in self._generator.uniform(-limit, limit, 4)]
+    def _draw(self) -> list[list[float]]:
+        """The offsets of the next 5 s."""
+        noise, drift = self._limits
+        white = self._generator.uniform(-noise, noise, (self._blocks, 4))
+        steady = self._generator.uniform(-drift, drift, 4)
+        return (white + steady).tolist()  # type: ignore[no-any-return]
 
 
 class Vehicle:
@@ -74,26 +82,38 @@ class Vehicle:
         noise: on the sticks while it flies.
         step_s: of physics.
         flying: whether it begins in the air.
+        battery: what it begins with, 0..1.
+        ceiling_m: above the world's ground; it climbs no higher.
     """
 
-    def __init__(self, plant: TumPlant, noise: StickNoise, step_s: float, flying: bool) -> None:
+    def __init__(
+        self,
+        plant: Plant,
+        noise: StickNoise,
+        step_s: float,
+        flying: bool,
+        battery: float = 1.0,
+        ceiling_m: float = 1000.0,
+    ) -> None:
         self._plant = plant
         self._noise = noise
         self._step_s = step_s
-        self._sticks = Sticks()
+        self._ceiling_m = ceiling_m
+        self._sticks = _NEUTRAL
         self._silence_s = 0.0
         self._apart_s = COLLISION_GAP_S
-        self._flight_s = 0.0
         self.state: VehicleState = "flying" if flying else "landed"
         self.collisions = 0
-
-    @property
-    def battery(self) -> float:
+        self.battery = battery
         """What is left, 0..1."""
-        return max(0.0, 1.0 - self._flight_s / BATTERY_LIFE_S)
 
     def control(
-        self, command: Command | None, state: BodyState, touch: Touch, below_m: float
+        self,
+        command: Command | None,
+        state: BodyState,
+        touch: Touch,
+        below_m: float,
+        wind_mps: Vector3,
     ) -> Loads:
         """The loads of the next step.
 
@@ -102,45 +122,61 @@ class Vehicle:
             state: the body's motion.
             touch: what it touches.
             below_m: the distance from the body's origin to what is below.
+            wind_mps: of the air, world.
         """
         self._listen(command, state, touch)
         self._move_on(state, touch, below_m)
         self._count_collisions(touch)
-        if self.state in ("landed", "emergency"):
+        now = self.state
+        if now == "landed" or now == "emergency":
             self._plant.restart()
-            return NO_LOADS
-        self._flight_s += self._step_s
-        if self.state == "taking_off":
-            return self._plant.loads(Sticks(), state, TAKE_OFF_LIFT)
-        if self.state == "landing":
-            return self._plant.loads(Sticks(), state, LANDING_LIFT)
-        return self._plant.loads(self._noise.add_to(self._sticks), state)
+            return self._plant.fall(state, wind_mps)
+        if now == "flying":
+            sticks = self._noise.add_to(self._sticks)
+            if sticks.vz > 0.0 and state.position_m[2] > self._ceiling_m:
+                sticks = Sticks(sticks.vx, sticks.vy, 0.0, sticks.wz)
+            loads = self._plant.fly(sticks, state, wind_mps, below_m)
+        elif now == "taking_off":
+            loads = self._plant.take_off(state, wind_mps, below_m)
+        else:
+            loads = self._plant.land(state, wind_mps, below_m)
+        share = loads.thrust_n / WEIGHT_N
+        self.battery = max(0.0, self.battery - self._step_s / HOVER_LIFE_S * share * share**0.5)
+        return loads
 
     def _listen(self, command: Command | None, state: BodyState, touch: Touch) -> None:
         if command is None:
             self._silence_s += self._step_s
             if self._silence_s > WATCHDOG_S:
-                self._sticks = Sticks()
+                self._sticks = _NEUTRAL
             return
         self._silence_s = 0.0
         self._sticks = Sticks(command.vx, command.vy, command.vz, command.wz)
+        if command.action == "fly":
+            return
         if command.action == "emergency":
             self.state = "emergency"
-        elif command.action == "takeoff" and self.state == "landed" and _upright(state):
-            self.state = "taking_off"
-        elif command.action == "land":
-            if self.state in ("taking_off", "flying"):
-                self.state = "landing"
-            elif self.state == "emergency" and _lies_still(state, touch):
-                self.state = "landed"
+        elif command.action == "takeoff":
+            if self.state == "landed" and state.tilt_rad < 0.5 and self.battery > BATTERY_LOW:
+                self.state = "taking_off"
+        elif self.state in ("taking_off", "flying"):
+            self.state = "landing"
+        elif self.state == "emergency" and _lies_still(state, touch):
+            self.state = "landed"
 
     def _move_on(self, state: BodyState, touch: Touch, below_m: float) -> None:
-        if self.state in ("taking_off", "flying", "landing") and tilt_of(state) > CAPSIZED_RAD:
+        now = self.state
+        if now == "landed" or now == "emergency":
+            return
+        if state.tilt_rad > CAPSIZED_RAD or self.battery == 0.0:
             self.state = "emergency"
-        elif self.state == "taking_off" and below_m >= TAKE_OFF_HEIGHT_M:
+        elif now == "landing":
+            if (touch.ground or touch.body) and below_m < 0.2:
+                self.state = "landed"
+        elif self.battery < BATTERY_LOW:
+            self.state = "landing"
+        elif now == "taking_off" and below_m >= TAKE_OFF_HEIGHT_M:
             self.state = "flying"
-        elif self.state == "landing" and (touch.ground or touch.body) and below_m < 0.2:
-            self.state = "landed"
 
     def _count_collisions(self, touch: Touch) -> None:
         hit = (touch.body and self.state != "landed") or (touch.ground and self.state == "flying")
@@ -152,10 +188,6 @@ class Vehicle:
         self._apart_s = 0.0
 
 
-def _upright(state: BodyState) -> bool:
-    return tilt_of(state) < 0.5
-
-
 def _lies_still(state: BodyState, touch: Touch) -> bool:
     speed = max(abs(each) for each in state.velocity_mps)
-    return (touch.ground or touch.body) and speed < STILL_MPS and _upright(state)
+    return (touch.ground or touch.body) and speed < STILL_MPS and state.tilt_rad < 0.5

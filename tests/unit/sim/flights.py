@@ -1,11 +1,12 @@
 """Flying the simulator step by step."""
 
 from collections.abc import Callable
+from typing import Any
 
 from common.messages import Command, CommandAction, Message, ResetRequest
+from services.sim.body import BodyState, Sticks
 from services.sim.config import Config
 from services.sim.core import PHYSICS_HZ, Simulation
-from services.sim.plant import BodyState, Sticks
 
 COMMAND_EVERY = PHYSICS_HZ // 50
 
@@ -24,11 +25,11 @@ def command(sticks: Sticks | None = None, action: CommandAction = "fly") -> Comm
     )
 
 
-def hovering(world: str = "empty", **settings: float) -> Simulation:
+def hovering(world: str = "empty", height_m: float = 1.0, **settings: Any) -> Simulation:
     """A vehicle in the air without noise, unless the settings say otherwise."""
     config = Config(world=world, **{"command_noise": 0.0, "sensor_noise": 0.0, **settings})
     simulation = Simulation(config)
-    simulation.reset(ResetRequest(position=(0.0, 0.0, 1.0)))
+    simulation.reset(ResetRequest(position=(0.0, 0.0, height_m)))
     return simulation
 
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from common.messages import ResetRequest, VehicleStatus
+from services.sim.body import GRAVITY_MPS2, Sticks
 from services.sim.config import Config
 from services.sim.core import PHYSICS_HZ, STEP_S, Simulation
-from services.sim.plant import GRAVITY_MPS2, Sticks
 
 fraction = st.floats(-1.0, 1.0)
 sticks = st.builds(Sticks, fraction, fraction, fraction, fraction)

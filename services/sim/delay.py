@@ -1,0 +1,23 @@
+"""A link's delay: what goes in at one step comes out a fixed number of steps later."""
+
+from collections import deque
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+
+class Delay(Generic[T]):
+    """A line of things on their way.
+
+    Args:
+        steps: how long each is on its way.
+        nothing: what comes out until then.
+    """
+
+    def __init__(self, steps: int, nothing: T) -> None:
+        self._line: deque[T] = deque([nothing] * steps)
+
+    def step(self, item: T) -> T:
+        """Put in what begins its way now; returns what arrives now."""
+        self._line.append(item)
+        return self._line.popleft()
