@@ -98,7 +98,9 @@ class Sources:
         theirs = self._console_sticks(now_ns)
         if not theirs.is_neutral:
             return Output(theirs, self._console_buttons, pressed, True)
-        return Output(mine, own.buttons if own is not None else (), pressed)
+        # A mark of the console says nothing about whose sticks count.
+        mine_held = own.buttons if own is not None else ()
+        return Output(mine, (*mine_held, *self._console_buttons), pressed)
 
     def _console_sticks(self, now_ns: int) -> Deflection:
         if self._begin_ns is None:
@@ -113,4 +115,5 @@ class Sources:
             # Lost while held. Silence after a neutral one is no loss.
             self._console_gate.pass_on(None)
         self._console = None
+        self._console_buttons = ()
         return NEUTRAL

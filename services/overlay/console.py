@@ -235,6 +235,8 @@ class Console:
                 self._lease.move(viewer.number, (vx, vy, vz, wz), self._clock.monotonic_ns())
             case protocol.Released():
                 self._lease.release(viewer.number, self._clock.monotonic_ns())
+            case protocol.Marked():
+                self._lease.mark(viewer.number, self._clock.monotonic_ns())
             case protocol.Decided():
                 task = asyncio.create_task(self._decide(viewer, said))
                 # The loop keeps only a weak reference to a task.

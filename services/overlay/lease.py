@@ -13,6 +13,8 @@ from common.topics import TOPICS
 STICK_MAX_AGE_NS = nanoseconds(TOPICS["console/stick"].max_age_s)
 HOLD_NS = nanoseconds(1.0)
 """The pad is free this long after its holder let go."""
+MARK_NS = nanoseconds(0.1)
+"""How long a mark is held down: a few sticks may be lost."""
 
 Sticks = tuple[float, float, float, float]
 NEUTRAL: Sticks = (0.0, 0.0, 0.0, 0.0)
@@ -36,6 +38,7 @@ class PadLease:
         self._heard_ns = 0
         self._held = False
         self._neutral_owed = False
+        self._mark_ns: int | None = None
 
     def move(self, client: int, sticks: Sticks, now_ns: int) -> bool:
         """Take a page's sticks; False if they do not count."""
@@ -57,6 +60,19 @@ class PadLease:
                 self._held = False
                 self._heard_ns = now_ns
 
+    def mark(self, client: int, now_ns: int) -> None:
+        """A page ends a primitive, unless another page flies."""
+        with self._lock:
+            self._expire(now_ns)
+            if self._holder in (None, client):
+                self._mark_ns = now_ns
+                self._neutral_owed = True
+
+    def is_marked(self, now_ns: int) -> bool:
+        """Whether a primitive has ended just now."""
+        with self._lock:
+            return self._mark_is_held(now_ns)
+
     def leave(self, client: int, now_ns: int) -> None:
         """The page is gone."""
         self.release(client, now_ns)
@@ -74,15 +90,20 @@ class PadLease:
             return "yours" if self._holder == client else "busy"
 
     def due(self, now_ns: int) -> Sticks | None:
-        """The sticks to publish now: those held, neutral once after them, then nothing."""
+        """The sticks to publish now: those held, neutral once after them or a mark, then none."""
         with self._lock:
             self._expire(now_ns)
             if self._held:
                 return self._sticks
+            if self._mark_is_held(now_ns):
+                return NEUTRAL
             if self._neutral_owed:
                 self._neutral_owed = False
                 return NEUTRAL
             return None
+
+    def _mark_is_held(self, now_ns: int) -> bool:
+        return self._mark_ns is not None and now_ns - self._mark_ns < MARK_NS
 
     def _expire(self, now_ns: int) -> None:
         silent_ns = now_ns - self._heard_ns

@@ -38,6 +38,10 @@ class Released(ClientMessage, frozen=True, tag="release"):
     """The page's sticks are let go: said once when it connects, and after they were held."""
 
 
+class Marked(ClientMessage, frozen=True, tag="mark"):
+    """A primitive ends here: said while data is collected."""
+
+
 class Decided(ClientMessage, frozen=True, tag="decide"):
     """A button was pressed."""
 
@@ -50,7 +54,7 @@ class Shown(ClientMessage, frozen=True, tag="shown"):
     """The last picture is on the screen."""
 
 
-FromPage = StickMoved | Released | Decided | Shown
+FromPage = StickMoved | Released | Marked | Decided | Shown
 
 
 class Answer(msgspec.Struct, frozen=True, tag_field="type", tag="decision"):

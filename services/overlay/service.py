@@ -12,6 +12,8 @@ from services.overlay.core import Overlay
 from services.overlay.lease import PadLease, Standing
 
 STICK_PERIOD_S = 0.02
+END_BUTTON = "end"
+"""What the page's end of a primitive is called among a stick's buttons."""
 AGES_SHOWN = ("camera/front", "pose", "stick", "autopilot", "vehicle")
 
 
@@ -62,8 +64,10 @@ def _console(node: Node, core: Overlay, config: Config) -> Console:
         if sticks is not None:
             vx, vy, vz, wz = sticks
             stamp_ns = node.clock.utc_ns()
+            buttons = [END_BUTTON] if lease.is_marked(now_ns) else None
             node.publish(
-                "console/stick", m.Stick(stamp=stamp_ns, seq=0, vx=vx, vy=vy, vz=vz, wz=wz)
+                "console/stick",
+                m.Stick(stamp=stamp_ns, seq=0, vx=vx, vy=vy, vz=vz, wz=wz, buttons=buttons),
             )
 
     def state_of(pad: Standing) -> protocol.State:

@@ -1,4 +1,4 @@
-"""What is wrong with labelled sticks, row by row. Pure."""
+"""What is wrong with labelled sticks, row by row."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -8,6 +8,7 @@ import numpy as np
 
 from common.sticks import DEAD_BAND
 from training.dataset.primitive import Primitive
+from training.dataset.store import DatasetError, Stored
 from training.dataset.track import BEYOND
 from training.labels import NONE
 
@@ -29,13 +30,39 @@ class Finding:
     row: int | None
     text: str
 
+    def __str__(self) -> str:
+        return self.text if self.row is None else f"row {self.row}: {self.text}"
 
-def check(primitives: Sequence[Primitive]) -> list[Finding]:
-    """What is wrong with a set."""
-    findings = [Finding(row, text) for row, p in enumerate(primitives) for text in _faults(p)]
-    findings += _duplicates(primitives)
-    findings.sort(key=lambda finding: finding.row if finding.row is not None else -1)
-    return findings + _dead_axes(primitives)
+
+def check(primitives: Sequence[Primitive], rows: Sequence[int] | None = None) -> list[Finding]:
+    """What is wrong with a set.
+
+    Args:
+        primitives: the set.
+        rows: their numbers in a file; None counts from 0.
+    """
+    rows = range(len(primitives)) if rows is None else rows
+    findings = [
+        Finding(row, f"{p.label} by {p.operator}: {text}")
+        for row, p in zip(rows, primitives, strict=True)
+        for text in _faults(p)
+    ]
+    return [*findings, *_duplicates(primitives, rows), *_dead_axes(primitives)]
+
+
+def check_stored(stored: Stored) -> list[Finding]:
+    """What is wrong with a file, in the order of its rows."""
+    primitives, rows, findings = [], [], []
+    for row in range(len(stored)):
+        try:
+            primitives.append(stored.primitive(row))
+            rows.append(row)
+        except DatasetError as error:
+            findings.append(Finding(row, str(error).removeprefix(f"{stored.path}: row {row}: ")))
+    if not len(stored):
+        findings.append(Finding(None, "there is no primitive in it; record or import some"))
+    findings += check(primitives, rows)
+    return sorted(findings, key=lambda each: len(stored) if each.row is None else each.row)
 
 
 def _faults(p: Primitive) -> list[str]:
@@ -79,15 +106,15 @@ def _faults(p: Primitive) -> list[str]:
     return faults
 
 
-def _duplicates(primitives: Sequence[Primitive]) -> list[Finding]:
-    seen: dict[bytes, int] = {}
+def _duplicates(primitives: Sequence[Primitive], rows: Sequence[int]) -> list[Finding]:
+    first: dict[bytes, tuple[int, Primitive]] = {}
     findings = []
-    for row, p in enumerate(primitives):
-        samples = p.sticks.tobytes()
-        if len(p) and seen.setdefault(samples, row) != row:
-            other = primitives[seen[samples]]
+    for row, p in zip(rows, primitives, strict=True):
+        earlier, other = first.setdefault(p.sticks.tobytes(), (row, p))
+        if earlier != row and len(p):
             note = f" but called {other.label}" if other.label != p.label else ""
-            findings.append(Finding(row, f"the same sticks as row {seen[samples]}{note}; keep one"))
+            text = f"{p.label} by {p.operator}: the same sticks as row {earlier}{note}; keep one"
+            findings.append(Finding(row, text))
     return findings
 
 

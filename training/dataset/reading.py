@@ -1,6 +1,6 @@
 """Any file of sticks as labelled primitives: format found, cut, labelled, kept to length."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -132,18 +132,27 @@ def read_file(path: Path, rules: Rules, file_format: Format | None = None) -> Re
             found, unlabelled = _from_track(path, track, rules)
             primitives += found
             problems += unlabelled
-    kept = []
+    return at_lengths(path, primitives, problems, rules.lengths)
+
+
+def at_lengths(
+    path: Path, primitives: Sequence[Primitive], problems: Sequence[Problem], lengths: Lengths
+) -> Reading:
+    """A file's primitives at their lengths; those that are dropped join its problems."""
+    reading = Reading([], list(problems))
     for primitive in primitives:
-        at_length = rules.lengths.apply(primitive)
+        at_length = lengths.apply(primitive)
         if isinstance(at_length, Primitive):
-            kept.append(at_length)
+            reading.primitives.append(at_length)
         else:
             where = primitive.source.removeprefix(f"{path.name} ")
-            problems.append(Problem(str(path), where, f"{primitive.label}: {at_length}; dropped"))
-    return Reading(kept, problems)
+            text = f"{primitive.label}: {at_length}; dropped"
+            reading.problems.append(Problem(str(path), where, text))
+    return reading
 
 
-def _operator(path: Path, rules: Rules) -> str:
+def operator_of(path: Path, rules: Rules) -> str:
+    """Who performed what is in a file."""
     return rules.operator or path.stem
 
 
@@ -164,7 +173,7 @@ def _from_vector(path: Path, vector: Vector, rules: Rules) -> Primitive:
         np.arange(len(vector.sticks)) / rules.rate_hz,
         vector.sticks,
         rules.label or vector.label,
-        _operator(path, rules),
+        operator_of(path, rules),
         rules.family,
         f"{path.name} row {vector.row}",
     )
@@ -197,7 +206,7 @@ def _from_track(path: Path, track: Track, rules: Rules) -> tuple[list[Primitive]
                 times_s - times_s[0],
                 track.sticks[segment.begin : segment.end],
                 label,
-                _operator(path, rules),
+                operator_of(path, rules),
                 rules.family,
                 f"{path.name} {where}",
                 track.utc_ns(segment.begin),

@@ -20,7 +20,7 @@ class Group:
         operators: how many people.
         samples: least, median and most samples of one.
         seconds: shortest, median and longest.
-        rate_hz: median.
+        rates_hz: lowest, median and highest.
     """
 
     name: str
@@ -28,7 +28,7 @@ class Group:
     operators: int
     samples: tuple[int, float, int]
     seconds: tuple[float, float, float]
-    rate_hz: float
+    rates_hz: tuple[float, float, float]
 
     @property
     def count(self) -> int:
@@ -38,17 +38,20 @@ class Group:
 
 def group_of(name: str, primitives: Sequence[Primitive]) -> Group:
     """The numbers of some primitives, at least one."""
-    sizes = np.array([len(p) for p in primitives])
-    durations_s = np.array([p.duration_s for p in primitives])
     labels = [p.label for p in primitives]
+    least, median, most = _spread([len(p) for p in primitives])
     return Group(
         name,
         {label: labels.count(label) for label in CLASSES},
         len({p.operator for p in primitives}),
-        (int(sizes.min()), float(np.median(sizes)), int(sizes.max())),
-        (float(durations_s.min()), float(np.median(durations_s)), float(durations_s.max())),
-        float(np.median([p.rate_hz for p in primitives])),
+        (int(least), median, int(most)),
+        _spread([p.duration_s for p in primitives]),
+        _spread([p.rate_hz for p in primitives]),
     )
+
+
+def _spread(values: Sequence[float]) -> tuple[float, float, float]:
+    return float(np.min(values)), float(np.median(values)), float(np.max(values))
 
 
 def grouped(primitives: Sequence[Primitive], key: Callable[[Primitive], str]) -> list[Group]:

@@ -132,3 +132,12 @@ def test_only_what_is_held_now_is_ever_sent(steps: list) -> None:
             allowed.append(console)
         assert output.sticks in allowed
         assert output.is_console == (output.sticks is not NEUTRAL and output.is_console)
+
+
+def test_a_mark_of_the_console_goes_with_whatever_sticks_count() -> None:
+    sources = Sources()
+    sources.step(0, Reading())
+    sources.console_stick(stick(NEUTRAL, ["end"]), 1)
+    output = sources.step(1, Reading(FORWARD, ("a",)))
+    assert (output.sticks, output.buttons, output.is_console) == (FORWARD, ("a", "end"), False)
+    assert sources.step(2 + MAX_AGE_NS, Reading(FORWARD)).buttons == ()

@@ -3,7 +3,7 @@
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from services.overlay.lease import HOLD_NS, NEUTRAL, STICK_MAX_AGE_NS, PadLease
+from services.overlay.lease import HOLD_NS, MARK_NS, NEUTRAL, STICK_MAX_AGE_NS, PadLease
 
 MS = 1_000_000
 FORWARD = (0.8, 0.0, 0.0, 0.0)
@@ -142,3 +142,21 @@ class Pages(RuleBasedStateMachine):
 
 
 TestPages = Pages.TestCase
+
+
+def test_a_mark_is_held_for_a_moment_with_the_sticks_as_they_are():
+    lease = lease_of(1)
+    lease.move(1, FORWARD, 0)
+    lease.mark(1, 0)
+    assert (lease.due(20 * MS), lease.is_marked(20 * MS)) == (FORWARD, True)
+    lease.release(1, 30 * MS)
+    assert (lease.due(40 * MS), lease.is_marked(40 * MS)) == (NEUTRAL, True)
+    assert (lease.due(MARK_NS), lease.is_marked(MARK_NS)) == (NEUTRAL, False)
+    assert lease.due(MARK_NS + 20 * MS) is None
+
+
+def test_a_mark_of_a_page_that_does_not_fly_is_none():
+    lease = lease_of(1, 2)
+    lease.move(1, FORWARD, 0)
+    lease.mark(2, 10 * MS)
+    assert not lease.is_marked(20 * MS)

@@ -28,13 +28,14 @@ export class Keyboard implements Source {
   private readonly sticks: Sticks = { vx: 0, vy: 0, vz: 0, wz: 0 };
   private last_ms = performance.now();
 
-  constructor(act: (action: Action) => void) {
+  constructor(act: (action: Action) => void, mark: () => void) {
     addEventListener("keydown", (event) => {
       // Ctrl+L and its like belong to the browser.
       if (event.ctrlKey || event.metaKey || event.altKey) return;
       const action = ACTIONS[event.code];
       if (event.code in MOVES) this.down.add(event.code);
       else if (action !== undefined && !event.repeat) act(action);
+      else if (event.code === "KeyE" && !event.repeat) mark();
       else return;
       event.preventDefault();
     });

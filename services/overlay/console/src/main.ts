@@ -35,6 +35,11 @@ function act(action: Action): void {
   }
 }
 
+/** A primitive ends here; `autocomplete dataset record` listens. */
+function mark(): void {
+  connection.send({ type: "mark" });
+}
+
 for (const action of ["accept", "cancel", "takeoff", "land", "emergency"] as const) {
   element<HTMLButtonElement>(action).addEventListener("click", (event) => {
     act(action);
@@ -43,6 +48,11 @@ for (const action of ["accept", "cancel", "takeoff", "land", "emergency"] as con
   });
 }
 
+element<HTMLButtonElement>("mark").addEventListener("click", (event) => {
+  mark();
+  (event.currentTarget as HTMLElement).blur();
+});
+
 const stage = element("stage");
 element("picture").addEventListener("dblclick", () => {
   if (document.fullscreenElement) void document.exitFullscreen();
@@ -50,6 +60,6 @@ element("picture").addEventListener("dblclick", () => {
 });
 
 const thumbs = new Thumbs(element("left-thumb"), element("right-thumb"));
-const hands = new Hands([new Pad(act), new Keyboard(act), thumbs], (message) =>
+const hands = new Hands([new Pad(act, mark), new Keyboard(act, mark), thumbs], (message) =>
   connection.send(message),
 );

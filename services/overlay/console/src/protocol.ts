@@ -58,5 +58,6 @@ export const NEUTRAL: Sticks = { vx: 0, vy: 0, vz: 0, wz: 0 };
 export type ToServer =
   | ({ type: "stick" } & Sticks)
   | { type: "release" }
+  | { type: "mark" }
   | { type: "shown" }
   | { type: "decide"; action: Action; nonce: number; suggestion?: number };

@@ -1,0 +1,250 @@
+"""`autocomplete dataset import`: files of sticks into one set."""
+
+import argparse
+import shlex
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+from cli import options as opts
+from cli.dataset import shared
+from training.labels import CLASSES, PRIMITIVES
+
+if TYPE_CHECKING:
+    from training.dataset.lengths import Lengths, Limit
+    from training.dataset.primitive import Primitive
+    from training.dataset.reading import Rules
+
+FORMATS = ("auto", "joy", "csv", "vectors", "mcap", "npz")
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("files", metavar="FILE", nargs="+", type=opts.existing_file)
+    parser.add_argument("--out", metavar="FILE.npz", type=shared.set_file, required=True)
+    parser.add_argument(
+        "--append", action="store_true", help="add to --out where it is there already"
+    )
+    parser.add_argument(
+        "--format",
+        choices=FORMATS,
+        default="auto",
+        help="joy: rostopic echo of sensor_msgs/Joy; csv: secs,a,b,c,tri,cir,X,squ;"
+        " vectors: cells [a, b, c], label last; mcap: of 'autocomplete record'; npz: a set (auto)",
+    )
+    shared.add_people(parser, "who performed (the file's name)", required=False)
+    labels = parser.add_argument_group("labels")
+    labels.add_argument("--label", choices=CLASSES, help="of everything in the files")
+    labels.add_argument(
+        "--buttons",
+        metavar="B=LABEL,...",
+        type=_buttons,
+        help="what the button that ended a primitive says of it"
+        " (triangle=line,circle=arc,cross=sine,square=helix, and so on around other pads)",
+    )
+    labels.add_argument(
+        "--classes",
+        metavar="LABEL,...",
+        type=_classes,
+        default=PRIMITIVES,
+        help=f"what the integers 0, 1, ... of vectors stand for ({','.join(PRIMITIVES)})",
+    )
+    labels.add_argument(
+        "--from-flights",
+        action="store_true",
+        help="label the sticks of recorded flights by what became of their suggestions:"
+        " accepted is the suggestion's primitive, taken back within 2 s is none",
+    )
+    labels.add_argument(
+        "--ignored-is-none",
+        action="store_true",
+        help="with --from-flights: suggestions that nobody accepted are none as well",
+    )
+    cut = parser.add_argument_group("axes and cutting")
+    cut.add_argument(
+        "--axes",
+        metavar="AXIS,...",
+        type=_axes,
+        help="the stick that each axis of the file is, of vx vy vz wz; _ skips one, -vz turns one"
+        " around (joy: vy,vx,wz,vz; csv and vectors: vy,vx,vz; so on newer drivers vy,vx,wz)",
+    )
+    cut.add_argument("--rate", metavar="HZ", type=_rate, help="of vectors, which lack times (45)")
+    cut.add_argument(
+        "--segmentation",
+        choices=("ours", "thesis"),
+        default="ours",
+        help="ours: cut at buttons and long rests; thesis: also wherever vx or vy is 0, runs of 90"
+        " rows (ours)",
+    )
+    cut.add_argument(
+        "--idle", metavar="S", type=opts.duration, help="a rest of S seconds ends a primitive (1)"
+    )
+    lengths = parser.add_argument_group("lengths, each as 45 (samples) or 1s (seconds)")
+    lengths.add_argument(
+        "--preset",
+        choices=("ours", "thesis"),
+        default="ours",
+        help="ours: 1s to 20s, kept whole; thesis: 45 to 400, brought to 200, padded (ours)",
+    )
+    lengths.add_argument("--shortest", metavar="N", type=_limit, help="drop what is shorter")
+    lengths.add_argument("--longest", metavar="N", type=_limit, help="drop what is longer")
+    lengths.add_argument(
+        "--length", metavar="SAMPLES", type=opts.positive, help="bring what is longer to so many"
+    )
+    lengths.add_argument(
+        "--over",
+        choices=("newest", "resample", "drop"),
+        help="how: keep the newest samples, resample the whole, or drop it (newest)",
+    )
+    lengths.add_argument("--pad", action="store_true", help="pad what is shorter with zeros")
+    opts.add_examples(
+        parser,
+        "autocomplete dataset import joy.yaml --out ana.npz --operator ana",
+        "autocomplete dataset import arcs.csv --label arc --axes vy,vx,wz --out arcs.npz",
+        "autocomplete dataset import vectors.csv --out thesis.npz --preset thesis",
+        "autocomplete dataset import recordings/*.mcap --out flights.npz --from-flights"
+        " --operator ana",
+        "autocomplete dataset import ana.npz ben.npz --out all.npz",
+    )
+    parser.set_defaults(action=_run)
+
+
+def _axes(text: str) -> str:
+    from training.dataset.axes import parse_axes
+
+    try:
+        parse_axes(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
+
+
+def _limit(text: str) -> "Limit":
+    from training.dataset.lengths import parse_limit
+
+    try:
+        return parse_limit(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _label(text: str) -> str:
+    if text not in CLASSES:
+        raise argparse.ArgumentTypeError(f"no label {text!r}; there are {', '.join(CLASSES)}")
+    return text
+
+
+def _buttons(text: str) -> dict[str, str]:
+    buttons = {}
+    for pair in text.split(","):
+        button, equals, label = pair.partition("=")
+        if not equals or not button.strip():
+            raise argparse.ArgumentTypeError(f"{pair!r}: write BUTTON=LABEL, as in circle=arc")
+        buttons[button.strip()] = _label(label.strip())
+    return buttons
+
+
+def _classes(text: str) -> tuple[str, ...]:
+    return tuple(_label(label.strip()) for label in text.split(","))
+
+
+def _rate(text: str) -> float:
+    try:
+        rate_hz = float(text)
+    except ValueError:
+        rate_hz = 0.0
+    if not 1.0 <= rate_hz <= 1000.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: use Hz, 1 to 1000")
+    return rate_hz
+
+
+def _lengths(options: argparse.Namespace) -> "Lengths":
+    from training.dataset.lengths import PRESETS
+
+    lengths = PRESETS[options.preset]
+    if options.shortest is not None:
+        lengths = replace(lengths, shortest=options.shortest)
+    if options.longest is not None:
+        lengths = replace(lengths, longest=options.longest)
+    if options.length is not None:
+        lengths = replace(lengths, length=options.length)
+    if lengths.length is None and (options.over or options.pad):
+        raise ValueError("--over and --pad need a --length to bring primitives to")
+    if options.over is not None:
+        lengths = replace(lengths, over=options.over)
+    return replace(lengths, padded=lengths.padded or options.pad)
+
+
+def _rules(options: argparse.Namespace) -> "Rules":
+    from training.dataset.reading import BUTTONS, Rules
+
+    rules = Rules(
+        axes=options.axes,
+        operator=options.operator,
+        family=options.family,
+        label=options.label,
+        buttons=options.buttons or BUTTONS,
+        segmentation=options.segmentation,
+        classes=options.classes,
+        lengths=_lengths(options),
+    )
+    if options.idle is not None:
+        rules = replace(rules, idle_s=options.idle)
+    return rules if options.rate is None else replace(rules, rate_hz=options.rate)
+
+
+def _run(options: argparse.Namespace) -> int:
+    with shared.training_installed():
+        from training.dataset.flights import read_flight
+        from training.dataset.reading import Reading, at_lengths, operator_of, read_file
+        from training.dataset.store import open_set, save
+        from training.dataset.track import Problem
+    if options.ignored_is_none and not options.from_flights:
+        raise ValueError("--ignored-is-none goes with --from-flights")
+    rules = _rules(options)
+    primitives: list[Primitive] = []
+    provenance = {}
+    if options.out.exists():
+        if not options.append:
+            raise OSError(f"{options.out} is there already; choose another --out, or --append")
+        before = open_set(options.out)
+        provenance = before.provenance
+        primitives = [before.primitive(row) for row in range(len(before))]
+    table = Table("file", *CLASSES, "problems", box=None, padding=(0, 2, 0, 0))
+    console = Console(stderr=True)
+    taken = 0
+    with shared.bar(console) as progress:
+        for path in progress.track(options.files, description="reading"):
+            try:
+                if options.from_flights:
+                    found, fates, problems = read_flight(
+                        path,
+                        operator_of(path, rules),
+                        rules.family,
+                        ignored_is_none=options.ignored_is_none,
+                    )
+                    reading = at_lengths(path, found, problems, rules.lengths)
+                    told = ", ".join(f"{count} {fate}" for fate, count in fates.items())
+                    console.print(f"{path.name}: suggestions: {told}", highlight=False)
+                else:
+                    file_format = None if options.format == "auto" else options.format
+                    reading = read_file(path, rules, file_format)
+            except OSError as error:
+                reading = Reading([], [Problem("", "", str(error))])
+            found = reading.primitives
+            shared.tell(reading.problems)
+            labels = [p.label for p in found]
+            counts = [str(labels.count(label)) for label in CLASSES]
+            table.add_row(path.name, *counts, str(len(reading.problems)))
+            primitives += found
+            taken += len(found)
+    console.print(table)
+    if not taken:
+        raise OSError("nothing of these files can be used, so nothing was written")
+    command = shlex.join(["import", *(str(path) for path in options.files)])
+    made = "; ".join(filter(None, [provenance.get("made", ""), command]))
+    save(options.out, primitives, {**provenance, "made": made})
+    print(f"{options.out}: {len(primitives)} primitives")
+    return 0
