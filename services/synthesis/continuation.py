@@ -1,6 +1,7 @@
 """From a shape to a path: it starts at the vehicle, and goes over to the shape."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,51 +13,61 @@ MAX_OFFSET_M = 0.5
 MIN_BLEND_M = 1.0
 BLEND_PER_OFFSET = 8.0
 """Blend length per offset: the path's direction is then within 13 degrees of the shape's."""
-MIN_PATH_M = 0.5
+MIN_SPEED_MPS = 0.2
+"""Slower than this the vehicle has no direction of travel that would be worth keeping."""
+MAX_KINK_RAD = math.radians(45.0)
+"""A vehicle that flies further off the shape's direction is doing something else."""
+BLEND_PER_KINK_M = 8.0
+"""Blend length per rad: the path's curvature then adds at most 0.5 1/m to the shape's."""
 LEVEL_SHARE = 0.05
 """Share of a tangent that must be level for it to have a yaw: 3 degrees off vertical."""
 
 
-def continue_from(
-    shape: Shape, here_m: Array, yaw_rad: float | None, min_height_m: float | None = None
-) -> list[tuple[float, float, float, float]]:
-    """The path [x, y, z, yaw] of a shape for a vehicle.
+@dataclass(frozen=True)
+class Vehicle:
+    """What the vehicle is doing where a path is to begin.
 
-    Args:
-        shape: fitted, anchored beside the vehicle.
-        here_m: where the vehicle is (3,); the path's first point.
-        yaw_rad: the vehicle's yaw, kept where the path has none or the shape does not turn the
-            vehicle; None means that the vehicle's yaw is not known.
-        min_height_m: cut the path where it sinks below this height (and below the vehicle).
+    Attributes:
+        here_m: its position (3,).
+        yaw_rad: its yaw, kept where a path has none or the shape does not turn the vehicle; None
+            where it is not known.
+        velocity_mps: (3,), world; None where it is not known.
+    """
+
+    here_m: Array
+    yaw_rad: float | None
+    velocity_mps: Array | None = None
+
+
+def continue_from(shape: Shape, vehicle: Vehicle) -> Array:
+    """The path (M, 4), x y z in m and yaw in rad, of a shape for a vehicle.
 
     Raises:
-        UnfitError: if the vehicle is not beside the shape, or too little path is left.
+        UnfitError: if the vehicle is not beside the shape, or does not fly along it.
     """
-    points = blend(shape.ahead(), here_m, shape.closed)
-    if yaw_rad is None:
+    ahead = shape.ahead()
+    points = blend(ahead, vehicle.here_m, shape.closed, _kink(ahead, vehicle.velocity_mps))
+    if vehicle.yaw_rad is None:
         yaw = _yaws(points, shape.closed, 0.0)
-    elif shape.turns_vehicle or heading_sector(points, yaw_rad) == 0:
-        yaw = _yaws(points, shape.closed, yaw_rad)
+    elif shape.turns_vehicle or heading_sector(ahead, vehicle.yaw_rad) == 0:
+        yaw = _yaws(points, shape.closed, vehicle.yaw_rad)
     else:
         # Flown sideways or backward, a line goes on sideways or backward.
-        yaw = np.full(len(points), wrap_angle(yaw_rad))
-    if min_height_m is not None:
-        low = np.flatnonzero(points[:, 2] < min(min_height_m, float(here_m[2])) - 1e-6)
-        if low.size and not shape.closed:
-            points, yaw = points[: low[0]], yaw[: low[0]]
-            left_m = float(np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-            if left_m < MIN_PATH_M:
-                raise UnfitError(f"it goes below {min_height_m} m at once")
-    return [
-        (float(x), float(y), float(z), float(a)) for (x, y, z), a in zip(points, yaw, strict=True)
-    ]
+        yaw = np.full(len(points), wrap_angle(vehicle.yaw_rad))
+    return np.column_stack([points, yaw])
 
 
-def blend(ahead_m: Array, here_m: Array, closed: bool) -> Array:
+def blend(ahead_m: Array, here_m: Array, closed: bool, kink: Array | None = None) -> Array:
     """Points (M, 3) that leave `here_m` and go over to a way (M, 3) that begins beside it.
 
-    The offset fades by a quintic whose slope and bend are zero at both ends; on a closed way it
-    grows back before the end.
+    The offset, and the kink where the vehicle's direction is not quite the way's, fade by quintics
+    whose slope and bend are zero at the end; on a closed way the offset grows back before the end.
+
+    Args:
+        ahead_m: the way.
+        here_m: where the vehicle is (3,).
+        closed: whether the way ends where it began.
+        kink: the vehicle's direction of travel less the way's (3,), unit vectors both.
 
     Raises:
         UnfitError: if the vehicle is too far from the way.
@@ -65,19 +76,52 @@ def blend(ahead_m: Array, here_m: Array, closed: bool) -> Array:
     offset_m = float(np.linalg.norm(offset))
     if offset_m > MAX_OFFSET_M:
         raise UnfitError(f"the vehicle is {offset_m:.2f} m away from it")
+    kink = np.zeros(3) if kink is None else kink
     steps = np.linalg.norm(np.diff(ahead_m, axis=0), axis=1)
     way = np.concatenate([[0.0], np.cumsum(steps)])
-    length = max(MIN_BLEND_M, BLEND_PER_OFFSET * offset_m)
+    length = max(
+        MIN_BLEND_M, BLEND_PER_OFFSET * offset_m, BLEND_PER_KINK_M * float(np.linalg.norm(kink))
+    )
+    to_end = way[-1] - way
     if closed:
         length = min(length, float(way[-1]) / 2.0)
-        way = np.minimum(way, way[-1] - way)
-    t = np.clip(way / length, 0.0, 1.0)
-    fade = 1.0 - t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
-    path = ahead_m + np.outer(fade, offset)
-    path[0] = here_m
+    path = ahead_m + np.outer(_fade(way / length), offset)
+    path += length * np.outer(_bend(way / length), kink)
     if closed:
+        path += np.outer(_fade(to_end / length), offset)
         path[-1] = here_m
+    path[0] = here_m
     return np.asarray(path)
+
+
+def _fade(t: Array) -> Array:
+    """From 1 at 0 to 0 at 1 and beyond, without slope or bend at either end."""
+    t = np.clip(t, 0.0, 1.0)
+    return np.asarray(1.0 - t**3 * (10.0 - 15.0 * t + 6.0 * t**2))
+
+
+def _bend(t: Array) -> Array:
+    """From 0 with slope 1 at 0 to 0 at 1 and beyond, without slope or bend there."""
+    t = np.clip(t, 0.0, 1.0)
+    return np.asarray(t - t**3 * (6.0 - 8.0 * t + 3.0 * t**2))
+
+
+def _kink(ahead_m: Array, velocity_mps: Array | None) -> Array:
+    """The direction of travel less the way's (3,); none where the vehicle hardly moves.
+
+    Raises:
+        UnfitError: if they have too little in common.
+    """
+    speed_mps = 0.0 if velocity_mps is None else float(np.linalg.norm(velocity_mps))
+    if velocity_mps is None or speed_mps < MIN_SPEED_MPS:
+        return np.zeros(3)
+    first = ahead_m[1] - ahead_m[0]
+    tangent = first / float(np.linalg.norm(first))
+    travel = velocity_mps / speed_mps
+    angle = math.acos(min(1.0, float(tangent @ travel)))
+    if angle > MAX_KINK_RAD:
+        raise UnfitError(f"the vehicle flies {math.degrees(angle):.0f} degrees off its direction")
+    return np.asarray(travel - tangent)
 
 
 def heading_sector(points_m: Array, yaw_rad: float) -> int:

@@ -1,32 +1,40 @@
 """From an intent and the poses of its window to a suggestion, or to the reason for none."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
+import worlds
 from common.clock import seconds
 from common.frames import Array, yaw_of
-from common.messages import NONE_LABEL, FitRequest, Intent, Pose, Suggestion
+from common.messages import (
+    NONE_LABEL,
+    FitRequest,
+    Intent,
+    Pose,
+    Refusal,
+    Suggestion,
+    VehicleStatus,
+)
 from common.topics import TOPICS
 from services.synthesis.config import Config
-from services.synthesis.continuation import continue_from, heading_sector
+from services.synthesis.continuation import Vehicle, continue_from, heading_sector
+from services.synthesis.fitting import check, fit, inflation, newest_motion, trust
 from services.synthesis.history import CELL_M, History, Track
+from services.synthesis.meaning import Running, same
 from services.synthesis.primitives import PRIMITIVES
 from services.synthesis.primitives.shape import Shape, UnfitError
+from services.synthesis.surroundings import Surroundings, Way
 
 POSE_MAX_AGE_S = TOPICS["pose"].max_age_s
-PARTS = (1.0, 0.75, 0.5, 0.35)
-"""Shares of the window's way, newest part, that are tried: a motion may begin as another one."""
-CORRELATION_M = 0.5
-"""A hand and an estimator err smoothly: points closer than this do not err independently."""
-MIN_ERROR_M = 0.005
-"""No estimate is trusted to be better than this, however well few points fit."""
-CONSISTENT_SIGMAS = 3.0
 MAX_POINTS = 400
 """More points of a request than this are averaged in groups of neighbours."""
 MAX_COORDINATE_M = 1e5
 SIMPLER_CONFIDENCE = 0.5
 """Factor on the confidence when geometry says something simpler than the intent."""
+MAX_REASON = 200
+KNOWN = PRIMITIVES
 
 
 class RefusalError(Exception):
@@ -40,27 +48,65 @@ class RefusalError(Exception):
         self.field = field
 
 
+@dataclass(frozen=True)
+class Offer:
+    """A shape that may be suggested.
+
+    Attributes:
+        shape: what is meant.
+        confidence: that it is, before the fit's own doubts.
+        note: why it is not what the intent says; empty if it is.
+    """
+
+    shape: Shape
+    confidence: float
+    note: str = ""
+
+
 class Synthesizer:
-    """Holds the pose history and counts suggestions."""
+    """Holds the pose history and the running suggestion, and counts suggestions."""
 
     def __init__(self, config: Config) -> None:
         self._config = config
         self._history = History()
+        self._surroundings = Surroundings(config)
+        self._world: str | None = None
+        self._running: Running | None = None
         self._last_id = 0
         self.last_refusal: str | None = None
         """Why the newest intent led to no suggestion; None if it did, or there was none."""
+        self.world_trouble: str | None = None
+        """Why nothing is known of what stands in the vehicle's world; None if it is."""
 
     def on_pose(self, pose: Pose, arrival_ns: int) -> None:
         """Remember where the vehicle is."""
         self._history.add(pose, arrival_ns)
 
-    def on_intent(self, intent: Intent, arrival_ns: int) -> Suggestion | None:
-        """A suggestion, or None with the reason in `last_refusal`."""
+    def on_vehicle(self, vehicle: VehicleStatus) -> None:
+        """Look up what stands in the world that the vehicle says it is in."""
+        if vehicle.world == self._world:
+            return
+        self._world = vehicle.world
+        self._surroundings = Surroundings(self._config)
+        self.world_trouble = None
+        try:
+            bodies = worlds.load(vehicle.world).bodies
+        except worlds.WorldError as error:
+            self.world_trouble = f"walls are not known: {error}"
+        else:
+            self._surroundings = Surroundings(self._config, bodies)
+
+    def on_intent(self, intent: Intent, arrival_ns: int) -> Suggestion | Refusal | None:
+        """A suggestion, or why there is none; None if nothing is meant."""
         try:
             suggestion = self._suggest(intent, arrival_ns)
         except RefusalError as refusal:
             self.last_refusal = str(refusal)
-            return None
+            if intent.label == NONE_LABEL:
+                return None
+            return Refusal(
+                stamp=intent.stamp, seq=0, label=intent.label, reason=_short(str(refusal))
+            )
         self.last_refusal = None
         return suggestion
 
@@ -79,6 +125,8 @@ class Synthesizer:
     def fit(self, request: FitRequest, stamp: int, now_ns: int) -> Suggestion:
         """The suggestion that continues the request's points from the last one on.
 
+        Nobody can accept it, so it may lead through walls.
+
         Args:
             request: a primitive, and points whose errors are independent.
             stamp: of the suggestion, ns.
@@ -88,8 +136,8 @@ class Synthesizer:
         Raises:
             RefusalError: if the points do not determine such a primitive.
         """
-        if request.primitive not in PRIMITIVES:
-            known = ", ".join(PRIMITIVES)
+        if request.primitive not in KNOWN:
+            known = ", ".join(KNOWN)
             raise RefusalError(
                 f"primitive {request.primitive!r} is unknown; known are {known}", "primitive"
             )
@@ -102,18 +150,24 @@ class Synthesizer:
                 [group.mean(axis=0) for group in np.array_split(points, MAX_POINTS, axis=0)]
             )
         try:
-            shape = _fit(PRIMITIVES[request.primitive], points, here)
-            _check(shape, self._config, inflation=1.0)
-            path = continue_from(shape, here, yaw_rad=None)
+            shape = fit(KNOWN[request.primitive], points, here)
+            check(shape, self._config, inflation=1.0)
+            path = continue_from(shape, Vehicle(here, yaw_rad=None))
         except UnfitError as unfit:
             raise RefusalError(f"{request.primitive}: {unfit}", "points") from None
-        return self._suggestion(
+        asked_mps = request.speed or self._config.cruise_mps
+        speed_mps = self._limited(asked_mps)
+        self._last_id += 1
+        return _suggestion(
+            self._last_id,
             shape,
-            path,
+            Way(path, shape.closed),
             stamp=stamp,
-            speed_mps=request.speed or self._config.cruise_mps,
-            confidence=_trust(shape, self._config, inflation=1.0),
+            speed_mps=speed_mps,
+            confidence=trust(shape, self._config, inflation=1.0),
             yaw_rad=self._present_yaw_rad(now_ns),
+            inflation=1.0,
+            note="" if speed_mps == asked_mps else f"speed {asked_mps:g} becomes {speed_mps:g} m/s",
         )
 
     def _suggest(self, intent: Intent, arrival_ns: int) -> Suggestion:
@@ -131,55 +185,83 @@ class Synthesizer:
         if track is None or len(track.points_m) * CELL_M < self._config.min_extent_m:
             moved_m = 0.0 if track is None else (len(track.points_m) - 1) * CELL_M
             raise RefusalError(f"{intent.label}: the vehicle moved only {moved_m:.1f} m")
+        if self._running is not None and not self._running.lasts(arrival_ns):
+            self._running = None
 
+        vehicle = Vehicle(track.here_m, track.yaw_rad, track.velocity_mps)
+        offer, path = self._offer(intent, track, vehicle)
+        shape = offer.shape
+        position_std_m = math.sqrt(max(newest[1].covariance[0], newest[1].covariance[1]))
+        try:
+            way = self._surroundings.keep(path, shape.closed, position_std_m)
+        except UnfitError as unfit:
+            raise RefusalError(f"{shape.name} withheld: {unfit}") from None
+        spread = inflation(shape)
+        return _suggestion(
+            self._id_of(shape, intent, arrival_ns),
+            shape,
+            way,
+            stamp=newest[1].stamp,
+            speed_mps=self._limited(track.speed_mps),
+            confidence=offer.confidence * trust(shape, self._config, spread),
+            yaw_rad=track.yaw_rad,
+            inflation=spread,
+            note="; ".join(note for note in (offer.note, way.note) if note),
+        )
+
+    def _offer(self, intent: Intent, track: Track, vehicle: Vehicle) -> tuple[Offer, Array]:
+        """The running meaning, if the intent may be a flicker; else what the intent says.
+
+        Raises:
+            RefusalError: if neither can be flown; the text says why.
+        """
+        running = self._running
+        if running is not None and running.shape.name in PRIMITIVES:
+            name = running.shape.name
+            if name != intent.label and running.outweighs(intent):
+                try:
+                    shape, path = self._continued(name, track, vehicle)
+                except UnfitError:
+                    pass
+                else:
+                    if same(shape, running.shape):
+                        return Offer(shape, intent.probabilities[name]), path
         label: str | None = intent.label
         confidence = intent.confidence
         reasons: list[str] = []
         while label is not None:
             try:
-                shape = _newest_motion(PRIMITIVES[label], track, self._config).as_meant()
-                path = continue_from(
-                    shape, track.here_m, track.yaw_rad, min_height_m=self._config.min_height_m
-                )
+                shape, path = self._continued(label, track, vehicle)
             except UnfitError as unfit:
                 reasons.append(f"{label}: {unfit}")
                 label = unfit.simpler
                 confidence *= SIMPLER_CONFIDENCE
-                continue
-            return self._suggestion(
-                shape,
-                path,
-                stamp=newest[1].stamp,
-                speed_mps=track.speed_mps,
-                confidence=confidence * _trust(shape, self._config, _inflation(shape)),
-                yaw_rad=track.yaw_rad,
-            )
+            else:
+                return Offer(shape, confidence, "; ".join(reasons)), path
         raise RefusalError("; ".join(reasons))
 
-    def _suggestion(
-        self,
-        shape: Shape,
-        path: list[tuple[float, float, float, float]],
-        *,
-        stamp: int,
-        speed_mps: float,
-        confidence: float,
-        yaw_rad: float,
-    ) -> Suggestion:
-        self._last_id += 1
-        return Suggestion(
-            stamp=stamp,
-            seq=0,
-            id=self._last_id,
-            primitive=shape.name,
-            params=shape.params,
-            path=path,
-            closed=shape.closed,
-            speed=min(max(speed_mps, self._config.min_speed_mps), self._config.max_speed_mps),
-            fit_rms=shape.quality.rms_m,
-            confidence=confidence,
-            heading_sector=heading_sector(np.array(path[:2])[:, :3], yaw_rad),
-        )
+    def _continued(self, name: str, track: Track, vehicle: Vehicle) -> tuple[Shape, Array]:
+        """The shape of the newest motion if it is a given primitive, and the path along it.
+
+        Raises:
+            UnfitError: if it is not.
+        """
+        shape = newest_motion(PRIMITIVES[name], track.points_m, track.here_m, self._config)
+        shape = shape.as_meant()
+        return shape, continue_from(shape, vehicle)
+
+    def _id_of(self, shape: Shape, intent: Intent, arrival_ns: int) -> int:
+        """The running suggestion's number if this one means the same, else the next."""
+        running = self._running
+        if running is None or not same(shape, running.shape):
+            self._last_id += 1
+            running = Running(self._last_id, shape, arrival_ns)
+        doubted = intent.label if intent.label != shape.name else None
+        self._running = Running(running.id, shape, arrival_ns, doubted)
+        return running.id
+
+    def _limited(self, speed_mps: float) -> float:
+        return min(max(speed_mps, self._config.min_speed_mps), self._config.max_speed_mps)
 
     def _present_yaw_rad(self, now_ns: int) -> float:
         """The vehicle's yaw if a fresh pose tells it, else 0."""
@@ -189,99 +271,36 @@ class Synthesizer:
         return yaw_of(newest[1].orientation)
 
 
-def _newest_motion(primitive: type[Shape], track: Track, config: Config) -> Shape:
-    """The shape of what the vehicle is doing now, from as much of the way as is part of it.
-
-    A window may begin with another motion. So parts of it are tried, the newest first, and the
-    longest is taken whose estimate agrees with those of all shorter ones within their errors
-    (Lepski's rule).
-
-    Raises:
-        UnfitError: if no part makes a shape that may be flown.
-    """
-    parts = [track.points_m[-round(share * len(track.points_m)) :] for share in PARTS]
-    parts = [points for points in parts if len(points) * CELL_M >= config.min_extent_m]
-    if not primitive.steady:
-        return _longest_acceptable(primitive, parts, track, config)
-    chosen: list[Shape] = []
-    unfit = UnfitError("the way is too short")
-    for points in reversed(parts):
-        try:
-            shape = _fit(primitive, points, track.here_m)
-        except UnfitError as error:
-            unfit = error
-            continue
-        if not all(_agree(shape, shorter) for shorter in chosen):
-            break
-        chosen.append(shape)
-    if not chosen:
-        raise unfit
-    _check(chosen[-1], config, _inflation(chosen[-1]))
-    return chosen[-1]
-
-
-def _longest_acceptable(
-    primitive: type[Shape], parts: list[Array], track: Track, config: Config
-) -> Shape:
-    """The shape of the longest part that makes one that may be flown, or the longest's reason."""
-    first: UnfitError | None = None
-    for points in parts:
-        try:
-            shape = _fit(primitive, points, track.here_m)
-            _check(shape, config, _inflation(shape))
-        except UnfitError as error:
-            first = first or error
-            continue
-        return shape
-    raise first or UnfitError("the way is too short")
-
-
-def _fit(primitive: type[Shape], points_m: Array, here_m: Array) -> Shape:
-    if len(points_m) < primitive.min_points:
-        raise UnfitError(f"{len(points_m)} points are too few; {primitive.min_points} are needed")
-    try:
-        return primitive.fit(points_m, here_m)
-    except (np.linalg.LinAlgError, FloatingPointError, OverflowError):
-        raise UnfitError("the points do not determine it") from None
-
-
-def _check(shape: Shape, config: Config, inflation: float) -> None:
-    """Raise UnfitError if a shape may not be flown; its errors are `inflation` times larger."""
-    quality = shape.quality
-    if quality.extent_m < config.min_extent_m:
-        raise UnfitError(f"only {quality.extent_m:.2f} m of it were flown")
-    shape.check(config)
-    if quality.rms_m > shape.rms_limit_m:
-        raise UnfitError(
-            f"it fits to {quality.rms_m:.2f} m only, {shape.rms_limit_m:.2f} m are allowed"
-        )
-    doubt = quality.doubt * inflation
-    if not doubt <= config.max_doubt:
-        raise UnfitError(f"it is known to {doubt:.0%} only, {config.max_doubt:.0%} are allowed")
-
-
-def _inflation(shape: Shape) -> float:
-    """How much larger errors are than those of points that err independently."""
-    quality = shape.quality
-    independent = max(quality.extent_m / CORRELATION_M, 2.0)
-    floor = max(1.0, MIN_ERROR_M / max(quality.rms_m, 1e-9))
-    return floor * math.sqrt(max(quality.count / independent, 1.0))
-
-
-def _agree(shape: Shape, other: Shape) -> bool:
-    """Whether two parts of the way have the same estimate within their errors."""
-    spread = math.hypot(
-        shape.quality.estimate_std * _inflation(shape),
-        other.quality.estimate_std * _inflation(other),
+def _suggestion(
+    number: int,
+    shape: Shape,
+    way: Way,
+    *,
+    stamp: int,
+    speed_mps: float,
+    confidence: float,
+    yaw_rad: float,
+    inflation: float,
+    note: str,
+) -> Suggestion:
+    path = [(float(x), float(y), float(z), float(yaw)) for x, y, z, yaw in way.path]
+    return Suggestion(
+        stamp=stamp,
+        seq=0,
+        id=number,
+        primitive=shape.name,
+        params=shape.params,
+        path=path,
+        closed=way.closed,
+        speed=speed_mps,
+        fit_rms=shape.quality.rms_m,
+        confidence=confidence,
+        heading_sector=heading_sector(way.path[:2, :3], yaw_rad),
+        params_std={name: std * inflation for name, std in shape.stds.items()},
+        note=_short(note) if note else None,
     )
-    difference = shape.quality.estimate - other.quality.estimate
-    if math.isfinite(shape.estimate_period):
-        difference = math.remainder(difference, shape.estimate_period)
-    return abs(difference) <= CONSISTENT_SIGMAS * spread
 
 
-def _trust(shape: Shape, config: Config, inflation: float) -> float:
-    """How good a fit is, from 1 for exact to 0.25 for just acceptable."""
-    misfit = min(shape.quality.rms_m / shape.rms_limit_m, 1.0)
-    doubt = min(shape.quality.doubt * inflation / config.max_doubt, 1.0)
-    return (1.0 - 0.5 * misfit) * (1.0 - 0.5 * doubt)
+def _short(reason: str) -> str:
+    """What fits a screen's line and the contract."""
+    return reason if len(reason) <= MAX_REASON else reason[: MAX_REASON - 3] + "..."

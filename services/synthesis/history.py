@@ -10,14 +10,19 @@ from common.clock import nanoseconds, seconds
 from common.frames import Array, yaw_of
 from common.messages import Pose
 
-SPAN_S = 10.0
-"""Longer than any window of the classifier: 200 sticks last 4 s."""
+SPAN_S = 40.0
+"""Longer than any window of the classifier; long enough for two lengths of a lawn."""
 CELL_M = 0.05
 """Poses within this length of the way become one point, so that slow parts do not weigh more."""
 SMOOTH_S = 0.1
 """Length of the way is measured over means of this time; noise of single poses would add to it."""
 SPEED_S = 1.0
 """The vehicle's present speed is its mean over this time; the velocity loop needs 0.4 s."""
+VELOCITY_S = 0.6
+"""The newest velocity is that of a parabola through this time's positions: no lag in curves."""
+REST_MPS = 0.1
+REST_S = 1.0
+"""A vehicle that makes less way than this speed would for this time has ended its motion."""
 GAP_S = 0.5
 JUMP_M = 1.0
 JUMP_MPS = 10.0
@@ -33,12 +38,14 @@ class Track:
         here_m: the newest position (3,).
         yaw_rad: the newest yaw.
         speed_mps: the recent mean speed.
+        velocity_mps: the newest velocity (3,), world.
     """
 
     points_m: Array
     here_m: Array
     yaw_rad: float
     speed_mps: float
+    velocity_mps: Array
 
 
 class History:
@@ -70,15 +77,34 @@ class History:
         chosen = [(ns, pose) for ns, pose in self._poses if begin_ns <= ns <= end_ns]
         if len(chosen) < 2:
             return None
-        time_s = np.array([seconds(ns - chosen[-1][0]) for ns, _ in chosen])
-        position_m = np.array([pose.position for _, pose in chosen])
-        way_m = _way(time_s, position_m)
+        time_s, position_m, way_m = _motion(chosen)
         return Track(
             _means(position_m, np.floor(way_m / CELL_M)),
             position_m[-1],
             yaw_of(chosen[-1][1].orientation),
             _recent_speed(time_s, way_m),
+            _velocity(time_s, position_m),
         )
+
+    def since_rest(self, end_ns: int) -> Array:
+        """Points (N, 3) about `CELL_M` apart of the way flown since the vehicle last rested."""
+        chosen = [(ns, pose) for ns, pose in self._poses if ns <= end_ns]
+        if len(chosen) < 2:
+            return np.empty((0, 3))
+        time_s, position_m, way_m = _motion(chosen)
+        before = np.searchsorted(time_s, time_s - REST_S)
+        resting = way_m - way_m[before] < REST_MPS * REST_S
+        resting &= time_s - time_s[0] >= REST_S
+        first = int(np.flatnonzero(resting)[-1]) if resting.any() else 0
+        way_m = way_m[first:] - way_m[first]
+        return _means(position_m[first:], np.floor(way_m / CELL_M))
+
+
+def _motion(chosen: list[tuple[int, Pose]]) -> tuple[Array, Array, Array]:
+    """Times (N,) before the newest in s, positions (N, 3), the length of the way up to each."""
+    time_s = np.array([seconds(ns - chosen[-1][0]) for ns, _ in chosen])
+    position_m = np.array([pose.position for _, pose in chosen])
+    return time_s, position_m, _way(time_s, position_m)
 
 
 def _means(values: Array, labels: Array) -> Array:
@@ -106,3 +132,11 @@ def _recent_speed(time_s: Array, way_m: Array) -> float:
     first = min(int(np.searchsorted(time_s, time_s[-1] - SPEED_S)), len(time_s) - 2)
     elapsed_s = float(time_s[-1] - time_s[first])
     return float(way_m[-1] - way_m[first]) / elapsed_s if elapsed_s > 0.0 else 0.0
+
+
+def _velocity(time_s: Array, position_m: Array) -> Array:
+    recent = time_s >= time_s[-1] - VELOCITY_S
+    since_s = time_s[recent] - time_s[-1]
+    basis = np.column_stack([np.ones(len(since_s)), since_s, since_s**2])
+    weights, *_ = np.linalg.lstsq(basis, position_m[recent], rcond=None)
+    return np.asarray(weights[1])

@@ -12,12 +12,15 @@ POSE_DEPTH = 256
 def wire(node: Node, config: Config) -> None:
     """Connect the core to its topics."""
     synthesizer = Synthesizer(config)
-    node.publishes("suggestion")
+    node.publishes("suggestion", "refusal")
 
     def on_intent(intent: m.Intent, arrival_ns: int) -> None:
-        suggestion = synthesizer.on_intent(intent, arrival_ns)
-        if suggestion is not None:
-            node.publish("suggestion", suggestion)
+        answer = synthesizer.on_intent(intent, arrival_ns)
+        if answer is not None:
+            node.publish("refusal" if isinstance(answer, m.Refusal) else "suggestion", answer)
+
+    def on_vehicle(vehicle: m.VehicleStatus, _arrival_ns: int) -> None:
+        synthesizer.on_vehicle(vehicle)
 
     def fit(request: m.FitRequest, now_ns: int) -> m.Suggestion:
         try:
@@ -28,11 +31,12 @@ def wire(node: Node, config: Config) -> None:
     def health() -> tuple[m.HealthState, str]:
         refusal = synthesizer.last_refusal
         detail = f"no suggestion: {refusal}" if refusal else ""
-        trouble = synthesizer.pose_trouble(node.clock.monotonic_ns())
+        trouble = synthesizer.pose_trouble(node.clock.monotonic_ns()) or synthesizer.world_trouble
         return ("ok", detail) if trouble is None else ("degraded", detail or trouble)
 
     # Poses before intents: those that wait together belong to the intent's window.
     node.on("pose", synthesizer.on_pose, depth=POSE_DEPTH)
+    node.on("vehicle", on_vehicle)
     node.on("intent", on_intent, timed=True)
     node.answer("synthesis/fit", fit)
     node.reports(health)

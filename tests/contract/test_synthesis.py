@@ -102,19 +102,28 @@ def suggestion_after(client: Client, label: str, flown_s: float = 2.2) -> dict[s
 
 
 def assert_no_suggestion(client: Client, message: dict[str, Any], reason: str) -> None:
-    suggestions = client.collect("suggestion")
+    suggestions, refusals = client.collect("suggestion"), client.collect("refusal")
     time.sleep(0.1)
-    seen = len(suggestions)
+    seen, refused = len(suggestions), len(refusals)
     client.publish("intent", message)
     health = client.next(f"health/{SERVICE}", lambda h: reason in h["detail"], timeout_s=4.0)
     assert health["service"] == SERVICE
     assert len(suggestions) == seen
+    told = refusals[refused:]
+    if message["label"] == "none":
+        assert not told
+        return
+    assert [each["label"] for each in told] == [message["label"]]
+    assert reason in told[0]["reason"]
+    assert set(refusals.encodings) == {"application/msgpack;Refusal/1"}
 
 
 def assert_complete(suggestion: dict[str, Any]) -> None:
     assert suggestion["id"] > 0
     assert set(suggestion["params"]) == PARAMS[suggestion["primitive"]]
     assert all(math.isfinite(v) for v in suggestion["params"].values())
+    assert set(suggestion["params_std"]) <= set(suggestion["params"])
+    assert all(math.isfinite(v) and v >= 0.0 for v in suggestion["params_std"].values())
     path = suggestion["path"]
     assert len(path) >= 2
     assert all(len(point) == 4 and all(math.isfinite(v) for v in point) for point in path)
@@ -124,7 +133,7 @@ def assert_complete(suggestion: dict[str, Any]) -> None:
     assert suggestion["fit_rms"] >= 0.0
     assert 0.3 <= suggestion["speed"] <= 1.0
     assert suggestion["heading_sector"] in range(8)
-    assert suggestion["closed"] == (suggestion["primitive"] == "arc")
+    assert suggestion["closed"] == (suggestion["primitive"] == "arc" and "note" not in suggestion)
 
 
 def test_a_flown_curve_becomes_the_circle_it_is_part_of(
@@ -181,7 +190,7 @@ def test_a_climbing_turn_becomes_a_helix(
     assert climbed == pytest.approx(3.0 * pitch, rel=0.05)
 
 
-def test_ids_and_seq_rise_unknown_fields_are_ignored_and_health_counts(
+def test_ids_follow_the_meaning_seq_rises_unknown_fields_are_ignored_and_health_counts(
     service: Process, client: Client, streams: Streams
 ) -> None:
     streams.add(
@@ -190,16 +199,19 @@ def test_ids_and_seq_rise_unknown_fields_are_ignored_and_health_counts(
     suggestions = client.collect("suggestion")
     seen = len(suggestions)
     suggestion_after(client, "line", flown_s=1.2)
+    time.sleep(0.2)
     client.put("intent", msgpack.packb(with_unknown_fields("Intent")))
     health = client.next(f"health/{SERVICE}", lambda h: h["rates"]["pose"] > 0.8 * POSE_RATE_HZ)
     assert len(suggestions) == seen + 2
+    # The second one means the same as the first: its path is newer, its number is not.
     ids = [suggestion["id"] for suggestion in suggestions]
-    assert ids == sorted(set(ids))
+    assert ids[-1] == ids[-2] > 0
+    assert suggestions[-1]["path"][0][0] > suggestions[-2]["path"][0][0]
     seqs = [suggestion["seq"] for suggestion in suggestions]
     assert all(b == a + 1 for a, b in pairwise(seqs))
     assert set(suggestions.encodings) == {"application/msgpack;Suggestion/1"}
     assert health["state"] == "ok"
-    assert set(health["rates"]) == set(health["rejected"]) == {"pose", "intent"}
+    assert set(health["rates"]) == set(health["rejected"]) == {"pose", "intent", "vehicle"}
     assert 0.0 < health["latency_p50"] <= health["latency_p99"] < 0.1
     assert set(client.collect(f"health/{SERVICE}").encodings) == {"application/msgpack;Health/1"}
 
@@ -217,6 +229,30 @@ def test_it_says_why_it_suggests_nothing(
     streams.add("pose", POSE_RATE_HZ, lambda _: pose(0.0, 0.0, 1.0, 0.0, status="lost"))
     time.sleep(0.3)
     assert_no_suggestion(client, intent("line"), "lost")
+
+
+def test_a_circle_ends_before_the_wall_that_stands_in_it(
+    service: Process, client: Client, streams: Streams
+) -> None:
+    # The circle's far side lies behind the fence of the track at y = 1.5 m.
+    centre = (5.0, 1.0)
+
+    def at(t_s: float) -> dict[str, Any]:
+        angle = SPEED * t_s / RADIUS - math.pi
+        x, y = centre[0] + RADIUS * math.cos(angle), centre[1] + RADIUS * math.sin(angle)
+        return pose(x, y, HEIGHT, angle + math.pi / 2.0)
+
+    status = {"state": "flying", "battery": 0.9, "plant": "tum", "collisions": 0}
+    streams.add("vehicle", 10.0, lambda _: {**status, "world": "track"})
+    streams.add("pose", POSE_RATE_HZ, at)
+    suggestion = suggestion_after(client, "arc", flown_s=2.0)
+    assert_complete(suggestion)
+    assert not suggestion["closed"]
+    assert "fence" in suggestion["note"]
+    assert max(point[1] for point in suggestion["path"]) < 1.5 - 0.27
+    streams.close()
+    streams.add("vehicle", 10.0, lambda _: {**status, "world": "empty"})
+    time.sleep(0.3)
 
 
 def points_of(primitive: str) -> list[list[float]]:
@@ -265,10 +301,14 @@ def test_fit_answers_with_the_primitive_through_the_points(
     assert sum(a * b for a, b in zip(step, first, strict=True)) > 0.0
 
 
-def test_fit_takes_the_speed_into_its_limits(service: Process, client: Client) -> None:
+def test_fit_takes_the_speed_into_its_limits_and_says_so(service: Process, client: Client) -> None:
     request = {"primitive": "line", "points": points_of("line")}
-    assert client.ask("synthesis/fit", {**request, "speed": 9.0})[1]["speed"] == 1.0
-    assert 0.3 <= client.ask("synthesis/fit", request)[1]["speed"] <= 1.0
+    fast = client.ask("synthesis/fit", {**request, "speed": 9.0})[1]
+    assert fast["speed"] == 1.0
+    assert "9" in fast["note"]
+    plain = client.ask("synthesis/fit", request)[1]
+    assert 0.3 <= plain["speed"] <= 1.0
+    assert "note" not in plain
 
 
 @pytest.mark.parametrize(

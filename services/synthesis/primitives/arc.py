@@ -6,6 +6,7 @@ here 64 points are half a turn, a lap is 2 pi, and angles grow counter-clockwise
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -14,8 +15,10 @@ import numpy as np
 from common.frames import Array
 from services.synthesis.config import Config
 from services.synthesis.primitives.shape import (
+    EXAMPLE_POINTS,
     MAX_STEPS,
     STEP_M,
+    Example,
     Quality,
     Shape,
     UnfitError,
@@ -28,6 +31,8 @@ RMS_SHARE = 0.15
 MIN_SAGITTA_SHARE = 1.5
 """Of the residual. 30 degrees at 5 % noise have 0.7 and no method finds their radius; 60 have 2.7
 (references.md, 8)."""
+SAME_SHARE = 0.25
+"""Circles that differ by this share of the radius are the same to who flies them by hand."""
 MIN_SWEEP_RAD = math.radians(20.0)
 """Less says too little about the centre."""
 LINE_SWEEP_RAD = math.radians(10.0)
@@ -43,13 +48,15 @@ class Circle:
     Attributes:
         centre_m: (2,).
         radius_m: its radius.
-        radius_std_m: standard error of the radius, if the points' errors are independent.
+        centre_std_m: standard errors (2,) of the centre, if the points' errors are independent.
+        radius_std_m: standard error of the radius, likewise.
         angles_rad: unwrapped angles (N,) of the points about the centre.
         off_m: signed distances (N,) of the points from the circle, + outside.
     """
 
     centre_m: Array
     radius_m: float
+    centre_std_m: Array
     radius_std_m: float
     angles_rad: Array
     off_m: Array
@@ -81,6 +88,24 @@ class Circle:
             estimate_std=self.radius_std_m / self.radius_m**2,
             doubt=self.radius_std_m / self.radius_m,
         )
+
+    @property
+    def params(self) -> dict[str, float]:
+        """Centre and radius."""
+        cx, cy = (float(v) for v in self.centre_m)
+        return {"cx": cx, "cy": cy, "radius": self.radius_m}
+
+    @property
+    def stds(self) -> dict[str, float]:
+        """Of the centre and the radius."""
+        cx, cy = (float(v) for v in self.centre_std_m)
+        return {"cx": cx, "cy": cy, "radius": self.radius_std_m}
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """A share of the radius, and not the other way round."""
+        share = SAME_SHARE * self.radius_m
+        return {"cx": share, "cy": share, "radius": share, "sweep": math.pi}
 
     def check(self, config: Config) -> None:
         """Raise UnfitError where it is too wide, too tight, or cannot be told from a line."""
@@ -153,15 +178,17 @@ def fit_circle(points_m: Array) -> Circle:
         sigma = math.sqrt(float(off @ off) / max(len(x) - 3, 1))
         # The error of a parabola's curvature: sigma sqrt(720 / N) / length^2.
         radius_std = sigma * math.sqrt(720.0 / len(x)) / chord_m**2 * radius**2
+        centre_std = np.full(2, radius_std)
     else:
         circle, covariance, _ = levenberg_marquardt(
             residuals, jacobian, np.array([*centre, radius])
         )
         centre, radius = circle[:2], abs(float(circle[2]))
         off = residuals(np.array([*centre, radius]))
-        radius_std = math.sqrt(max(float(covariance[2, 2]), 0.0))
+        errors = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
+        centre_std, radius_std = errors[:2], float(errors[2])
     angles = np.unwrap(np.arctan2(y - centre[1], x - centre[0]))
-    return Circle(centre, radius, radius_std, angles, off)
+    return Circle(centre, radius, centre_std, radius_std, angles, off)
 
 
 def angles_ahead(start_rad: float, sense: float, half_turn_m: float, half_turns: int) -> Array:
@@ -169,6 +196,21 @@ def angles_ahead(start_rad: float, sense: float, half_turn_m: float, half_turns:
     steps = half_turns * max(POINTS_PER_HALF_TURN, math.ceil(half_turn_m / STEP_M))
     ways = np.linspace(0.0, half_turns * math.pi, min(steps, MAX_STEPS) + 1)
     return np.asarray(start_rad + sense * ways)
+
+
+def example_circle(rng: np.random.Generator, sweep_rad: float) -> tuple[dict[str, float], Array]:
+    """A random circle's parameters, and angles (N,) in rad around it, either way."""
+    cx, cy = rng.uniform(-10.0, 10.0, 2)
+    radius = math.exp(rng.uniform(math.log(0.6), math.log(6.0)))
+    begin, sense = rng.uniform(-math.pi, math.pi), rng.choice((-1.0, 1.0))
+    angles = begin + sense * np.linspace(0.0, sweep_rad, EXAMPLE_POINTS)
+    return {"cx": cx, "cy": cy, "radius": radius}, angles
+
+
+def on_circle(params: Mapping[str, float], angles_rad: Array) -> Array:
+    """Points (N, 2) of a circle at angles (N,)."""
+    around = np.column_stack([np.cos(angles_rad), np.sin(angles_rad)])
+    return np.array([params["cx"], params["cy"]]) + params["radius"] * around
 
 
 @dataclass(frozen=True)
@@ -179,8 +221,17 @@ class Arc(Shape):
     closed: ClassVar[bool] = True
     min_points: ClassVar[int] = 5
 
+    figures: ClassVar[Mapping[str, str]] = {
+        "cx": "m",
+        "cy": "m",
+        "z": "m",
+        "radius": "m",
+        "sweep": "rad",
+    }
+
     circle: Circle
     height_m: float
+    height_std_m: float
     start_rad: float
 
     @classmethod
@@ -193,19 +244,36 @@ class Arc(Shape):
             circle.quality(rms),
             circle,
             float(heights.mean()),
+            float(heights.std()) / math.sqrt(len(heights)),
             circle.angle_of(start_m[:2]),
         )
 
     @property
     def params(self) -> dict[str, float]:
         """Centre, height, radius, and the sweep of the way ahead: one lap, signed."""
-        return {
-            "cx": float(self.circle.centre_m[0]),
-            "cy": float(self.circle.centre_m[1]),
-            "z": self.height_m,
-            "radius": self.circle.radius_m,
-            "sweep": self.circle.sense * 2.0 * math.pi,
-        }
+        sweep = self.circle.sense * 2.0 * math.pi
+        return {**self.circle.params, "z": self.height_m, "sweep": sweep}
+
+    @property
+    def stds(self) -> dict[str, float]:
+        """Of the circle and its height."""
+        return {**self.circle.stds, "z": self.height_std_m}
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """The circle's."""
+        return self.circle.tolerances
+
+    @classmethod
+    def example(cls, rng: np.random.Generator, extent: float) -> Example:
+        """Any circle, either way round; `extent` in rad."""
+        params, angles = example_circle(rng, extent)
+        z = rng.uniform(1.0, 3.0)
+        points = np.column_stack([on_circle(params, angles), np.full(len(angles), z)])
+        return Example(
+            points,
+            {**params, "z": z, "sweep": math.copysign(2.0 * math.pi, angles[-1] - angles[0])},
+        )
 
     @property
     def rms_limit_m(self) -> float:
@@ -220,6 +288,6 @@ class Arc(Shape):
         """One lap, whose last point is its first."""
         circle = self.circle
         angles = angles_ahead(self.start_rad, circle.sense, math.pi * circle.radius_m, 2)
-        xy = circle.centre_m + circle.radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
+        xy = on_circle(circle.params, angles)
         xy[-1] = xy[0]
         return np.column_stack([xy, np.full(len(xy), self.height_m)])

@@ -4,6 +4,7 @@ The axis is kept vertical: a free one costs 24 % of pitch error at half a turn (
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -11,8 +12,15 @@ import numpy as np
 
 from common.frames import Array
 from services.synthesis.config import Config
-from services.synthesis.primitives.arc import RMS_SHARE, Circle, angles_ahead, fit_circle
-from services.synthesis.primitives.shape import Quality, Shape, UnfitError
+from services.synthesis.primitives.arc import (
+    RMS_SHARE,
+    Circle,
+    angles_ahead,
+    example_circle,
+    fit_circle,
+    on_circle,
+)
+from services.synthesis.primitives.shape import Example, Quality, Shape, UnfitError
 
 TURNS = 3
 MIN_PITCH_M = 0.1
@@ -20,6 +28,8 @@ MIN_PITCH_M = 0.1
 MAX_SLOPE = 2.0
 """Climb per way flown level; steeper, the turn is lost in the drift of a climb."""
 MIN_PITCH_SIGMAS = 3.0
+SAME_PITCH_SHARE = 0.4
+"""Pitches that differ by this share are the same to who flies them by hand."""
 
 
 @dataclass(frozen=True)
@@ -27,11 +37,20 @@ class Helix(Shape):
     """A circle and a pitch in m a turn, + up; the `estimate` is the curvature, as an arc's."""
 
     name: ClassVar[str] = "helix"
+    figures: ClassVar[Mapping[str, str]] = {
+        "cx": "m",
+        "cy": "m",
+        "z": "m",
+        "radius": "m",
+        "sweep": "rad",
+        "pitch": "m a turn",
+    }
     min_points: ClassVar[int] = 5
 
     circle: Circle
     start_rad: float
     start_height_m: float
+    start_height_std_m: float
     pitch_m: float
     pitch_std_m: float
 
@@ -51,26 +70,51 @@ class Helix(Shape):
         start_rad = circle.angle_of(start_m[:2])
         start_turned = circle.sense * start_rad / (2.0 * math.pi)
         rms = math.sqrt(float(np.mean(circle.off_m**2) + np.mean(off**2)))
+        sigma = math.sqrt(float(off @ off) / max(len(off) - 2, 1))
+        pitch_std = sigma / math.sqrt(power)
+        since_mean = start_turned - turned_mean
         return cls(
             _climbing(circle.quality(rms), pitch, circle.radius_m),
             circle,
             start_rad,
-            height_mean + pitch * (start_turned - turned_mean),
+            height_mean + pitch * since_mean,
+            math.hypot(sigma / math.sqrt(len(off)), pitch_std * since_mean),
             pitch,
-            math.sqrt(float(off @ off) / max(len(off) - 2, 1) / power),
+            pitch_std,
         )
 
     @property
     def params(self) -> dict[str, float]:
         """An arc's, with the height where the way ahead begins and its whole sweep; pitch."""
         return {
-            "cx": float(self.circle.centre_m[0]),
-            "cy": float(self.circle.centre_m[1]),
+            **self.circle.params,
             "z": self.start_height_m,
-            "radius": self.circle.radius_m,
             "sweep": self.circle.sense * TURNS * 2.0 * math.pi,
             "pitch": self.pitch_m,
         }
+
+    @property
+    def stds(self) -> dict[str, float]:
+        """Of the circle, the height beside the vehicle and the pitch."""
+        return {**self.circle.stds, "z": self.start_height_std_m, "pitch": self.pitch_std_m}
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """The circle's, and a share of the pitch."""
+        pitch = max(SAME_PITCH_SHARE * abs(self.pitch_m), MIN_PITCH_M)
+        return {**self.circle.tolerances, "pitch": pitch}
+
+    @classmethod
+    def example(cls, rng: np.random.Generator, extent: float) -> Example:
+        """Any circle, up or down; `extent` in rad."""
+        params, angles = example_circle(rng, extent)
+        pitch = rng.choice((-1.0, 1.0)) * rng.uniform(0.3, 2.0)
+        heights = rng.uniform(3.0, 6.0) + pitch * np.abs(angles - angles[0]) / (2.0 * math.pi)
+        sweep = math.copysign(TURNS * 2.0 * math.pi, angles[-1] - angles[0])
+        return Example(
+            np.column_stack([on_circle(params, angles), heights]),
+            {**params, "z": float(heights[-1]), "sweep": sweep, "pitch": pitch},
+        )
 
     @property
     def rms_limit_m(self) -> float:
@@ -90,7 +134,7 @@ class Helix(Shape):
         circle = self.circle
         half_turn_m = math.hypot(math.pi * circle.radius_m, self.pitch_m / 2.0)
         angles = angles_ahead(self.start_rad, circle.sense, half_turn_m, 2 * TURNS)
-        xy = circle.centre_m + circle.radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
+        xy = on_circle(circle.params, angles)
         turned = np.abs(angles - self.start_rad) / (2.0 * math.pi)
         return np.column_stack([xy, self.start_height_m + self.pitch_m * turned])
 

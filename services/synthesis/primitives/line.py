@@ -6,6 +6,7 @@ direction is that of total least squares, signed by the motion.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -13,7 +14,14 @@ import numpy as np
 
 from common.frames import Array
 from services.synthesis.config import Config
-from services.synthesis.primitives.shape import STEP_M, Quality, Shape, UnfitError
+from services.synthesis.primitives.shape import (
+    EXAMPLE_POINTS,
+    STEP_M,
+    Example,
+    Quality,
+    Shape,
+    UnfitError,
+)
 
 AHEAD_M = 20.0
 HALF_SECTOR_RAD = math.pi / 8.0
@@ -22,6 +30,8 @@ LEVEL_CLIMB_RAD = math.radians(5.0)
 """Climbs up to this are not meant: a stick inside the dead band gives 1.4 at full speed."""
 VERTICAL_CLIMB_RAD = math.radians(80.0)
 """Above this it is a straight climb: hands off, a drone drifts by a tenth of its climbing speed."""
+LEVEL_SHARE = 0.2
+"""Level part of a direction below which a heading is not meant: 78 degrees up."""
 RMS_SHARE = 0.1
 """Of its length: a line flown by hand wobbles by a few hundredths."""
 MAX_BEND = 0.08
@@ -36,6 +46,13 @@ class Line(Shape):
     """
 
     name: ClassVar[str] = "line"
+    figures: ClassVar[Mapping[str, str]] = {
+        "x": "m",
+        "y": "m",
+        "z": "m",
+        "heading": "rad",
+        "climb": "rad",
+    }
     turns_vehicle: ClassVar[bool] = False
     min_points: ClassVar[int] = 3
     estimate_period: ClassVar[float] = 2.0 * math.pi
@@ -43,6 +60,8 @@ class Line(Shape):
     anchor_m: Array
     direction: Array
     bend: float
+    angle_std_rad: float
+    anchor_std_m: float
 
     @classmethod
     def fit(cls, points_m: Array, start_m: Array) -> Self:
@@ -65,6 +84,7 @@ class Line(Shape):
         sigma = math.sqrt(squares / 2.0 / max(count - 2, 1))
         angle_std = sigma / float(singular[0])
         level = math.hypot(direction[0], direction[1])
+        reach = float((start_m - centre) @ direction)
         return cls(
             quality=Quality(
                 rms_m=math.sqrt(squares / count),
@@ -74,9 +94,11 @@ class Line(Shape):
                 estimate_std=angle_std / max(level, 1e-3),
                 doubt=angle_std / HALF_SECTOR_RAD,
             ),
-            anchor_m=centre + direction * float((start_m - centre) @ direction),
+            anchor_m=centre + direction * reach,
             direction=direction,
             bend=_sagitta(sideways, along) / extent,
+            angle_std_rad=angle_std,
+            anchor_std_m=math.hypot(sigma / math.sqrt(count), angle_std * reach),
         )
 
     @property
@@ -86,6 +108,38 @@ class Line(Shape):
         dx, dy, dz = (float(v) for v in self.direction)
         climb = math.atan2(dz, math.hypot(dx, dy))
         return {"x": x, "y": y, "z": z, "heading": math.atan2(dy, dx), "climb": climb}
+
+    @property
+    def stds(self) -> dict[str, float]:
+        """Of the anchor sideways, and of the two angles; a vertical line's heading is unknown."""
+        level = math.hypot(self.direction[0], self.direction[1])
+        heading = min(self.angle_std_rad / max(level, 1e-9), math.pi)
+        return {
+            **{
+                name: self.anchor_std_m * math.sqrt(max(0.0, 1.0 - float(part) ** 2))
+                for name, part in zip("xyz", self.direction, strict=True)
+            },
+            "heading": heading,
+            "climb": self.angle_std_rad,
+        }
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """Half a sector to either side; where it lies is where the vehicle is."""
+        steep = math.hypot(self.direction[0], self.direction[1]) < LEVEL_SHARE
+        return {"heading": math.pi if steep else HALF_SECTOR_RAD, "climb": HALF_SECTOR_RAD}
+
+    @classmethod
+    def example(cls, rng: np.random.Generator, extent: float) -> Example:
+        """Any direction; `extent` in m."""
+        direction = rng.normal(size=3)
+        direction /= np.linalg.norm(direction)
+        points = rng.uniform(-10.0, 10.0, 3) + np.outer(
+            np.linspace(0.0, extent, EXAMPLE_POINTS), direction
+        )
+        (x, y, z), (dx, dy, dz) = points[-1], direction
+        heading, climb = math.atan2(dy, dx), math.atan2(dz, math.hypot(dx, dy))
+        return Example(points, {"x": x, "y": y, "z": z, "heading": heading, "climb": climb})
 
     @property
     def rms_limit_m(self) -> float:

@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -16,6 +16,10 @@ STEP_M = 0.1
 """Spacing of the path ahead."""
 MAX_STEPS = 4000
 """A Suggestion holds 4096 points; longer ways ahead get longer steps."""
+
+
+EXAMPLE_POINTS = 90
+"""Points of an example: 2 s of sticks at the thesis' 45 Hz."""
 
 
 class UnfitError(Exception):
@@ -52,10 +56,25 @@ class Quality:
 
 
 @dataclass(frozen=True)
+class Example:
+    """A motion whose shape is known.
+
+    Attributes:
+        points_m: (N, 3), on the shape, oldest first.
+        params: the shape's parameters, for a vehicle at the last point.
+    """
+
+    points_m: Array
+    params: dict[str, float]
+
+
+@dataclass(frozen=True)
 class Shape(ABC):
     """A fitted primitive, anchored where the vehicle is."""
 
     name: ClassVar[str]
+    figures: ClassVar[Mapping[str, str]]
+    """The parameters' names, as in the contract's Suggestion, and their units."""
     closed: ClassVar[bool] = False
     """Whether the way ahead ends where it began."""
     turns_vehicle: ClassVar[bool] = True
@@ -80,7 +99,25 @@ class Shape(ABC):
     @property
     @abstractmethod
     def params(self) -> dict[str, float]:
-        """The parameters, named as in the contract's Suggestion."""
+        """The parameters, named as in `figures`."""
+
+    @property
+    @abstractmethod
+    def stds(self) -> dict[str, float]:
+        """Standard errors of parameters by name, if the points' errors are independent.
+
+        What the shape chooses for the way ahead, as the sweep of an arc, has none.
+        """
+
+    @property
+    @abstractmethod
+    def tolerances(self) -> dict[str, float]:
+        """Differences of parameters that do not make it another meaning to a person."""
+
+    @classmethod
+    @abstractmethod
+    def example(cls, rng: np.random.Generator, extent: float) -> Example:
+        """A random motion of this shape for tests and figures; `extent` as the module says."""
 
     @property
     @abstractmethod

@@ -7,6 +7,7 @@ not the wave's.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -15,8 +16,10 @@ import numpy as np
 from common.frames import Array
 from services.synthesis.config import Config
 from services.synthesis.primitives.shape import (
+    EXAMPLE_POINTS,
     MAX_STEPS,
     STEP_M,
+    Example,
     Quality,
     Shape,
     UnfitError,
@@ -29,6 +32,9 @@ RMS_SHARE = 0.3
 MIN_AMPLITUDE_M = 0.05
 MIN_WAVES = 0.5
 """Less has no bend to either side; the thesis' data has one inflection at least (4.1)."""
+SAME_HEADING_RAD = math.radians(20.0)
+SAME_SHARE = 0.3
+"""Waves that differ by this share are the same to who flies them by hand."""
 _MAX_WAVES = 6.0
 _START_WAVES = np.geomspace(0.4, _MAX_WAVES, 20)
 _START_POINTS = 45
@@ -46,6 +52,15 @@ class Sine(Shape):
     """
 
     name: ClassVar[str] = "sine"
+    figures: ClassVar[Mapping[str, str]] = {
+        "x": "m",
+        "y": "m",
+        "z": "m",
+        "heading": "rad",
+        "amplitude": "m",
+        "wavelength": "m",
+        "phase": "rad",
+    }
     min_points: ClassVar[int] = 8
     steady: ClassVar[bool] = False
 
@@ -55,6 +70,8 @@ class Sine(Shape):
     wavelength_m: float
     phase_rad: float
     waves: float
+    errors: Mapping[str, float]
+    """Standard errors by the parameters' names."""
 
     @classmethod
     def fit(cls, points_m: Array, start_m: Array) -> Self:
@@ -73,11 +90,13 @@ class Sine(Shape):
         amplitude = math.hypot(sine, cosine)
         phase = math.atan2(cosine, sine)
         order = np.arange(len(along)) - (len(along) - 1) / 2.0
-        if along @ order < 0.0:
+        sign = 1.0 if along @ order >= 0.0 else -1.0
+        if sign < 0.0:
             # Looking the other way both coordinates change sign: -A sin(-k s + p) = A sin(k s - p).
             axis_rad += math.pi
             offset, phase, along = -offset, -phase, -along
-        start_along = float(_turned(start_m[None, :2] - mean, axis_rad)[0][0])
+        beside = _turned(start_m[None, :2] - mean, axis_rad)
+        start_along, start_across = float(beside[0][0]), float(beside[1][0])
         heading = math.remainder(axis_rad, 2.0 * math.pi)
         cos, sin = math.cos(heading), math.sin(heading)
         amplitude_var = (
@@ -88,6 +107,13 @@ class Sine(Shape):
         wavelength = 2.0 * math.pi / number
         wavelength_doubt = math.sqrt(max(float(covariance[4, 4]), 0.0)) / number
         extent = float(np.ptp(along))
+        # Derivatives of the axis' place and of the phase beside the vehicle.
+        shift = np.array([sign * start_along, 1.0, 0.0, 0.0, 0.0])
+        offset_std = math.sqrt(max(float(shift @ covariance @ shift), 0.0))
+        square = max(amplitude**2, 1e-12)
+        turn = np.array(
+            [number * start_across, 0.0, -sign * cosine / square, sign * sine / square, start_along]
+        )
         return cls(
             quality=Quality(
                 rms_m=rms,
@@ -111,6 +137,15 @@ class Sine(Shape):
             wavelength_m=wavelength,
             phase_rad=math.remainder(phase + number * start_along, 2.0 * math.pi),
             waves=extent / wavelength,
+            errors={
+                "x": abs(sin) * offset_std,
+                "y": abs(cos) * offset_std,
+                "z": float(heights.std()) / math.sqrt(len(heights)),
+                "heading": math.sqrt(max(float(covariance[0, 0]), 0.0)),
+                "amplitude": math.sqrt(max(amplitude_var, 0.0)),
+                "wavelength": wavelength_doubt * wavelength,
+                "phase": min(math.sqrt(max(float(turn @ covariance @ turn), 0.0)), math.pi),
+            },
         )
 
     @property
@@ -126,6 +161,44 @@ class Sine(Shape):
             "wavelength": self.wavelength_m,
             "phase": self.phase_rad,
         }
+
+    @property
+    def stds(self) -> dict[str, float]:
+        """Of every parameter."""
+        return dict(self.errors)
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """The axis' direction, and shares of the wave's size; its place and phase move on."""
+        return {
+            "heading": SAME_HEADING_RAD,
+            "amplitude": SAME_SHARE * self.amplitude_m,
+            "wavelength": SAME_SHARE * self.wavelength_m,
+        }
+
+    @classmethod
+    def example(cls, rng: np.random.Generator, extent: float) -> Example:
+        """Any wave in any direction; `extent` in waves."""
+        amplitude, wavelength = rng.uniform(0.2, 0.8), rng.uniform(1.5, 4.0)
+        heading, phase = rng.uniform(-math.pi, math.pi, 2)
+        anchor = np.array([*rng.uniform(-10.0, 10.0, 2), rng.uniform(1.0, 3.0)])
+        along = np.linspace(0.0, extent * wavelength, EXAMPLE_POINTS)
+        across = amplitude * np.sin(2.0 * math.pi * along / wavelength + phase)
+        cos, sin = math.cos(heading), math.sin(heading)
+        way = np.column_stack(
+            [cos * along - sin * across, sin * along + cos * across, np.zeros(len(along))]
+        )
+        beside = anchor + along[-1] * np.array([cos, sin, 0.0])
+        return Example(
+            anchor + way,
+            {
+                **dict(zip("xyz", (float(v) for v in beside), strict=True)),
+                "heading": heading,
+                "amplitude": amplitude,
+                "wavelength": wavelength,
+                "phase": math.remainder(phase + 2.0 * math.pi * extent, 2.0 * math.pi),
+            },
+        )
 
     @property
     def rms_limit_m(self) -> float:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthesis_truth import arc_points, helix_points, sine_points
 
-from services.synthesis.continuation import blend, continue_from, heading_sector
+from services.synthesis.continuation import Vehicle, blend, continue_from, heading_sector
 from services.synthesis.primitives import PRIMITIVES
 from services.synthesis.primitives.line import Line
 from services.synthesis.primitives.shape import UnfitError
@@ -29,7 +29,7 @@ def test_a_path_starts_at_the_vehicle_and_has_no_step_and_no_kink(name, offset, 
     points = MOTIONS[name]
     here = points[-1] + np.array(offset)
     shape = PRIMITIVES[name].fit(points, here)
-    path = np.array(continue_from(shape, here, yaw))
+    path = continue_from(shape, Vehicle(here, yaw))
     assert path.shape[1] == 4
     assert np.allclose(path[0, :3], here)
     steps = np.diff(path[:, :3], axis=0)
@@ -53,7 +53,7 @@ def test_a_path_starts_at_the_vehicle_and_has_no_step_and_no_kink(name, offset, 
 @given(name=st.sampled_from(["arc", "helix", "sine"]), offset=offsets)
 def test_yaw_is_along_the_tangent_of_curves(name, offset):
     here = MOTIONS[name][-1] + np.array(offset)
-    path = np.array(continue_from(PRIMITIVES[name].fit(MOTIONS[name], here), here, 0.3))
+    path = continue_from(PRIMITIVES[name].fit(MOTIONS[name], here), Vehicle(here, 0.3))
     chord = path[2:, :2] - path[:-2, :2]
     off = np.arctan2(chord[:, 1], chord[:, 0]) - path[1:-1, 3]
     assert np.abs(np.angle(np.exp(1j * off))).max() < math.radians(3.0)
@@ -83,7 +83,7 @@ def test_the_sector_is_counted_from_the_body_counter_clockwise(sector, yaw):
 
 def line_path(direction, yaw):
     points = np.outer(along, direction) + np.array([0.0, 0.0, 2.0])
-    return np.array(continue_from(Line.fit(points, points[-1]), points[-1], yaw, 0.3))
+    return continue_from(Line.fit(points, points[-1]), Vehicle(points[-1], yaw))
 
 
 def test_a_line_flown_backward_goes_on_backward():
@@ -98,13 +98,40 @@ def test_a_vertical_line_keeps_the_yaw():
     assert np.allclose(line_path([0.0, 0.0, 1.0], yaw=-1.2)[:, 3], -1.2)
 
 
-def test_a_path_that_sinks_is_cut_above_the_ground():
-    points = np.column_stack([along, np.zeros(90), 3.0 - 0.5 * along])
-    path = np.array(continue_from(Line.fit(points, points[-1]), points[-1], 0.0, 0.3))
-    assert 0.3 <= path[-1, 2] < 0.4
+@settings(max_examples=120, deadline=None)
+@given(
+    name=st.sampled_from(list(PRIMITIVES)),
+    offset=offsets,
+    turn=st.floats(-0.6, 0.6),
+    speed=st.floats(0.3, 2.0),
+)
+def test_a_path_leaves_in_the_direction_of_travel(name, offset, turn, speed):
+    here = MOTIONS[name][-1] + np.array(offset)
+    shape = PRIMITIVES[name].fit(MOTIONS[name], here)
+    ahead = shape.ahead()
+    dx, dy, dz = ahead[1] - ahead[0]
+    cos, sin = math.cos(turn), math.sin(turn)
+    travel = np.array([cos * dx - sin * dy, sin * dx + cos * dy, dz])
+    travel /= np.linalg.norm(travel)
+    path = continue_from(shape, Vehicle(here, 0.0, speed * travel))[:, :3]
+    assert np.allclose(path[0], here)
+    steps = np.diff(path, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    assert steps[0] @ travel / lengths[0] > math.cos(math.radians(6.0))
+    bends = np.sum(steps[1:] * steps[:-1], axis=1) / (lengths[1:] * lengths[:-1])
+    assert bends.min() > math.cos(math.radians(20.0))
+    # Later it is the shape's.
+    half = len(path) // 2
+    assert np.allclose(path[half], ahead[half], atol=0.3)
 
 
-def test_a_path_that_sinks_below_the_height_at_once_is_refused():
-    points = np.column_stack([np.zeros(90), np.zeros(90), 3.5 - along])
-    with pytest.raises(UnfitError, match="below"):
-        continue_from(Line.fit(points, points[-1]), points[-1], 0.0, 0.3)
+def test_a_vehicle_that_flies_off_the_shape_gets_no_path():
+    line = Line.fit(MOTIONS["line"], MOTIONS["line"][-1])
+    with pytest.raises(UnfitError, match="degrees off"):
+        continue_from(line, Vehicle(line.anchor_m, 0.0, np.array([-0.5, 1.0, 0.0])))
+
+
+def test_a_vehicle_that_hardly_moves_has_no_direction_to_keep():
+    line = Line.fit(MOTIONS["line"], MOTIONS["line"][-1])
+    slow = Vehicle(line.anchor_m, 0.0, np.array([-0.1, 0.1, 0.0]))
+    assert np.array_equal(continue_from(line, slow), continue_from(line, Vehicle(slow.here_m, 0.0)))

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthesis_truth import S, arc_points, intent, noisy, pose, poses, sine_points
 
-from common.messages import FitRequest
+from common.messages import FitRequest, Refusal, Suggestion
 from services.synthesis.config import Config
 from services.synthesis.core import RefusalError, Synthesizer
 
@@ -123,14 +123,14 @@ def test_the_sector_is_that_of_travel_against_the_body():
     assert synthesizer.on_intent(intent("line", 3.0), now_ns).heading_sector == 6
 
 
-def test_ids_rise():
-    synthesizer, now_ns = flown(lambda t: np.array([SPEED * t, 0.0, 1.0]), 3.0)
-    ids = [synthesizer.on_intent(intent("line", 2.0), now_ns).id for _ in range(3)]
-    assert ids == [1, 2, 3]
-
-
 def refusal(synthesizer, message, now_ns):
-    assert synthesizer.on_intent(message, now_ns) is None
+    answer = synthesizer.on_intent(message, now_ns)
+    if message.label == "none":
+        assert answer is None
+    else:
+        assert isinstance(answer, Refusal)
+        assert answer.reason == synthesizer.last_refusal
+        assert answer.label == message.label
     return synthesizer.last_refusal
 
 
@@ -186,14 +186,17 @@ def test_any_motion_gives_a_path_from_the_vehicle_or_a_reason(label, seed, windo
 
     synthesizer, now_ns = flown(where, 4.0)
     suggestion = synthesizer.on_intent(intent(label, window_s), now_ns)
-    if suggestion is None:
-        assert synthesizer.last_refusal
+    if isinstance(suggestion, Refusal):
+        assert suggestion.reason
         return
+    assert isinstance(suggestion, Suggestion)
     path = np.array(suggestion.path)
     assert path[0, :3] == pytest.approx(where(4.0))
     assert np.linalg.norm(np.diff(path[:, :3], axis=0), axis=1).max() < 0.25
-    assert suggestion.closed == (suggestion.primitive == "arc")
+    assert not suggestion.closed or suggestion.primitive == "arc"
     assert 0.3 <= suggestion.speed <= 1.0
+    assert path[:, 2].min() >= 0.29 or path[:, 2].min() >= path[0, 2] - 0.01
+    assert set(suggestion.params_std) <= set(suggestion.params)
 
 
 def ask(primitive, points, speed=None):

@@ -52,7 +52,7 @@ def test_only_the_window_counts():
 
 
 def test_old_poses_are_forgotten():
-    track = history_of(poses(lambda t: np.array([t, 0.0, 1.0]), 15.0)).track(0, 100 * S)
+    track = history_of(poses(lambda t: np.array([t, 0.0, 1.0]), 45.0)).track(0, 100 * S)
     assert track.points_m[0, 0] == pytest.approx(5.0, abs=0.05)
 
 
