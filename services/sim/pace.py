@@ -27,11 +27,15 @@ class Pace:
             self.slipped_ns += lag_ns
             lag_ns = 0
         steps = lag_ns * PHYSICS_HZ // NS_PER_S
+        self.note(now_ns, steps)
+        return steps
+
+    def note(self, now_ns: int, steps: int) -> None:
+        """Count steps that are done whatever the clock says."""
         self._steps += steps
         self._history.append((now_ns, self._steps))
         while now_ns - self._history[0][0] > _WINDOW_NS:
             self._history.popleft()
-        return steps
 
     @property
     def real_time_factor(self) -> float:

@@ -1,4 +1,4 @@
-"""Wiring of the simulator: a clock drives its steps, commands go in, messages come out."""
+"""Wiring of the simulator: a clock or the commands drive its steps, messages come out."""
 
 from collections import deque
 
@@ -7,7 +7,7 @@ from common import messages as m
 from common.clock import seconds
 from common.node import Node, RefusedError
 from services.sim.config import Config
-from services.sim.core import VIDEO_TOPICS, ResetError, Simulation, cameras_of
+from services.sim.core import PHYSICS_HZ, VIDEO_TOPICS, ResetError, Simulation, cameras_of
 from services.sim.pace import Pace
 from services.sim.studio import Studio
 from services.sim.vehicle import WATCHDOG_S
@@ -16,12 +16,17 @@ TICK_S = 0.005
 """The period of the IMU, so that each sample leaves when it is due."""
 COMMAND_DEPTH = 16
 """Commands between two ticks all count, since one of them may say take off or land."""
+STEPS_A_COMMAND = PHYSICS_HZ // 50
+"""In lock-step each command is that of the next 20 ms, its period."""
+IDLE_S = 0.5
+"""In lock-step, the period at which the vehicle says that it is there, whoever waits for whom."""
 LOW_FACTOR = 0.95
 
 
 def wire(node: Node, config: Config) -> None:
     """Connect the simulator to the node."""
-    simulation = Simulation(config, node.clock.utc_ns())
+    in_lockstep = config.clock == "lockstep"
+    simulation = Simulation(config, 0 if in_lockstep else node.clock.utc_ns())
     pace = Pace(node.clock.monotonic_ns())
     studio: Studio | None = None
     node.publishes("imu", "truth", "altimeter", "vehicle", *VIDEO_TOPICS)
@@ -32,13 +37,30 @@ def wire(node: Node, config: Config) -> None:
         node.on_close(studio.close)
     heard: deque[tuple[m.Command, int]] = deque(maxlen=COMMAND_DEPTH)
 
+    def advance(command: m.Command | None) -> None:
+        step = simulation.step(command)
+        for topic, message in step.messages:
+            node.publish(topic, message)
+        if step.shots and studio is not None:
+            studio.take(step.shots)
+            if in_lockstep:
+                studio.finish()
+
     def tick(now_ns: int) -> None:
         for _ in range(pace.due(now_ns)):
-            step = simulation.step(_next_fresh(heard, now_ns))
-            for topic, message in step.messages:
-                node.publish(topic, message)
-            if step.shots and studio is not None:
-                studio.take(step.shots)
+            advance(_next_fresh(heard, now_ns))
+
+    def hear(command: m.Command, arrival_ns: int) -> None:
+        heard.append((command, arrival_ns))
+
+    def obey(command: m.Command, arrival_ns: int) -> None:
+        pace.note(arrival_ns, STEPS_A_COMMAND)
+        advance(command)
+        for _ in range(STEPS_A_COMMAND - 1):
+            advance(None)
+
+    def wait(_now_ns: int) -> None:
+        node.publish("vehicle", simulation.status())
 
     def reset(request: m.ResetRequest, _now_ns: int) -> m.VehicleStatus:
         try:
@@ -56,19 +78,21 @@ def wire(node: Node, config: Config) -> None:
     def health() -> tuple[m.HealthState, str]:
         factor = pace.real_time_factor
         detail = f"real-time factor {factor:.3f}, world {simulation.world}"
+        is_late = factor < LOW_FACTOR and not in_lockstep
         if studio is None:
-            return ("ok" if factor >= LOW_FACTOR else "degraded"), f"{detail}, no pictures"
+            return ("degraded" if is_late else "ok"), f"{detail}, no pictures"
         if studio.failure:
             return "failed", f"{detail}, no pictures: {studio.failure}"
         dropped = sum(studio.dropped.values())
         detail = f"{detail}, pictures by {studio.renderer}, {dropped} dropped"
-        return ("ok" if factor >= LOW_FACTOR else "degraded"), detail
+        return ("degraded" if is_late else "ok"), detail
 
-    def hear(command: m.Command, arrival_ns: int) -> None:
-        heard.append((command, arrival_ns))
-
-    node.on("command", hear, depth=COMMAND_DEPTH)
-    node.every(TICK_S, tick, timed=True)
+    if in_lockstep:
+        node.on("command", obey, depth=COMMAND_DEPTH, timed=True)
+        node.every(IDLE_S, wait)
+    else:
+        node.on("command", hear, depth=COMMAND_DEPTH)
+        node.every(TICK_S, tick, timed=True)
     node.answer("sim/reset", reset)
     node.answer("sim/worlds", names)
     node.reports(health)

@@ -78,10 +78,8 @@ class Stage:
         )
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, **on)
         self._ground = pybullet.createMultiBody(0.0, plane, **on)
-        self._compounds = [
-            add_bodies(world.bodies[begin : begin + _COMPOUND], **on)
-            for begin in range(0, len(world.bodies), _COMPOUND)
-        ]
+        self._groups = _neighbours(world.bodies)
+        self._compounds = [add_bodies(group, **on) for group in self._groups]
         self._bounds_m = _bounds_of(world.bodies)
         hull = pybullet.createCollisionShape(
             pybullet.GEOM_BOX, halfExtents=[side / 2.0 for side in HULL_M], **on
@@ -216,15 +214,15 @@ class Stage:
     def scene(self) -> Scene:
         """What cameras see, read back from pybullet so that what is seen is what collides."""
         bodies: list[Body] = []
-        for compound in self._compounds:
-            for part in pybullet.getCollisionShapeData(compound, -1, **self._on):
+        for compound, group in zip(self._compounds, self._groups, strict=True):
+            parts = pybullet.getCollisionShapeData(compound, -1, **self._on)
+            for part, body in zip(parts, group, strict=True):
                 size = part[3]
                 if part[2] == pybullet.GEOM_CYLINDER:
                     size = (2.0 * part[3][1], 2.0 * part[3][1], part[3][0])
                 elif part[2] == pybullet.GEOM_SPHERE:
                     size = (2.0 * part[3][0],) * 3
-                texture = self._world.bodies[len(bodies)].texture
-                bodies.append(Body(_SHAPES[part[2]], size, part[5], part[6], texture))
+                bodies.append(Body(_SHAPES[part[2]], size, part[5], part[6], body.texture))
         return Scene(tuple(bodies), self._world.strips, self._world.ground)
 
 
@@ -255,6 +253,20 @@ def add_visible(body: Body, colour: tuple[float, ...], **on: int) -> None:
         form = {"radius": width / 2.0}
     shape = pybullet.createVisualShape(_KINDS[body.shape], rgbaColor=colour, **form, **on)
     pybullet.createMultiBody(0.0, -1, shape, body.position_m, body.orientation, **on)
+
+
+def _neighbours(bodies: tuple[Body, ...]) -> list[tuple[Body, ...]]:
+    """The bodies in groups of at most _COMPOUND, each of what stands close together."""
+    if not bodies:
+        return []
+    if len(bodies) <= _COMPOUND:
+        return [bodies]
+    places = np.asarray([body.position_m for body in bodies])
+    axis = int(np.argmax(np.ptp(places, axis=0)))
+    order = np.argsort(places[:, axis], kind="stable")
+    half = len(bodies) // 2
+    near, far = (tuple(bodies[i] for i in part) for part in (order[:half], order[half:]))
+    return [*_neighbours(near), *_neighbours(far)]
 
 
 def _bounds_of(bodies: tuple[Body, ...]) -> tuple[Any, Any]:

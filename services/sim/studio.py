@@ -99,6 +99,7 @@ class Studio:
         self._scene: Scene | None = None
         self._stopping = False
         self._ready = False
+        self._busy = False
         self.dropped: Counter[str] = Counter()
         self.renderer = "starting"
         self.failure = ""
@@ -121,6 +122,12 @@ class Studio:
                 self._shots[shot.topic] = shot
             self._wake.notify()
 
+    def finish(self) -> None:
+        """Wait until all pictures that were asked for are taken."""
+        with self._wake:
+            while (self._shots or self._scene or self._busy) and not self.failure:
+                self._wake.wait()
+
     def close(self) -> None:
         """Stop, after the picture that is being taken."""
         with self._wake:
@@ -140,18 +147,23 @@ class Studio:
                 pass
             renderer.close()
         except Exception as error:
-            self.failure = str(error)
             log.exception("no more pictures")
+            with self._wake:
+                self.failure = str(error)
+                self._wake.notify_all()
 
     def _take_next(self, renderer: Renderer) -> bool:
         """Wait for work and do it; False when it is time to stop."""
         with self._wake:
+            self._busy = False
+            self._wake.notify_all()
             while not (self._shots or self._scene or self._stopping):
                 self._wake.wait()
             if self._stopping:
                 return False
             scene, self._scene = self._scene, None
             shots, self._shots = self._shots, {}
+            self._busy = True
         if scene is not None:
             renderer.load(scene)
         for topic, shot in shots.items():

@@ -1,0 +1,74 @@
+"""In lock-step physics waits for commands, and a seed is a flight to the bit, pictures included."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from flights import command
+
+from common.clock import ManualClock
+from common.memory_bus import MemoryBus, MemoryNetwork
+from common.messages import ResetRequest, encode
+from common.node import Node
+from common.topics import key_of
+from services.sim.body import Sticks
+from services.sim.config import Config
+from services.sim.service import wire
+
+TOPICS = ("imu", "truth", "altimeter", "camera/front", "camera/down")
+
+
+@contextmanager
+def stage(config: Config) -> Iterator[tuple[Node, ManualClock, dict[str, list[bytes]]]]:
+    """The simulator, its clock, and what it has sent."""
+    network, clock = MemoryNetwork(), ManualClock()
+    node = Node(MemoryBus(network), "unit", "sim", clock)
+    ears = MemoryBus(network)
+    heard: dict[str, list[bytes]] = {topic: [] for topic in TOPICS}
+    for topic, payloads in heard.items():
+        ears.subscribe(key_of("unit", topic), payloads.append)
+    wire(node, config)
+    try:
+        yield node, clock, heard
+    finally:
+        node.close()
+
+
+def flown(seed: int, renderer: str, duration_s: float) -> dict[str, list[bytes]]:
+    config = Config(seed=seed, clock="lockstep", renderer=renderer)  # type: ignore[arg-type]
+    with stage(config) as (node, _, heard):
+        ask = MemoryBus(node.bus._network)  # type: ignore[attr-defined]
+        key = key_of("unit", "command")
+        publication = ask.publication(key, None, "")  # type: ignore[arg-type]
+        for count in range(round(duration_s * 50)):
+            action = "takeoff" if count < 5 else "fly"
+            publication.put(encode(command(Sticks(vx=0.3, wz=0.1), action)))
+            node.spin()
+        return heard
+
+
+def test_physics_waits_for_commands_however_long_that_takes() -> None:
+    with stage(Config(clock="lockstep", renderer="none")) as (node, clock, heard):
+        for _ in range(100):
+            clock.advance(0.1)
+            node.spin()
+        assert heard["truth"] == []
+    assert len(flown(1, "none", 0.5)["truth"]) == 50
+
+
+def test_a_seed_is_a_flight_to_the_bit() -> None:
+    assert flown(5, "none", 3.0) == flown(5, "none", 3.0)
+    assert flown(5, "none", 1.0)["imu"] != flown(6, "none", 1.0)["imu"]
+
+
+def test_no_picture_is_dropped() -> None:
+    first, second = (flown(5, "auto", 0.5) for _ in range(2))
+    assert first == second
+    assert (len(first["camera/front"]), len(first["camera/down"])) == (15, 30)
+
+
+def test_a_reset_is_granted_while_it_waits() -> None:
+    with stage(Config(clock="lockstep", renderer="none")) as (node, _, heard):
+        request = ResetRequest(world="empty", position=(1.0, 2.0, 3.0))
+        handler = next(s.handler for s in node._servers if s.query.name == "sim/reset")
+        assert handler(request, 0).world == "empty"
+        assert heard["truth"] == []
