@@ -1,21 +1,16 @@
-"""How the `tum` plant flies: its formulas, its noise, its states, its collisions."""
+"""How the `tum` plant flies: its formulas, its states, its collisions."""
 
 import math
 
 import numpy as np
 import pytest
 from flights import command, fly, hovering
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from common.messages import ResetRequest, VehicleStatus
 from services.sim.body import GRAVITY_MPS2, Sticks
 from services.sim.config import Config
 from services.sim.core import PHYSICS_HZ, STEP_S, Simulation
-
-fraction = st.floats(-1.0, 1.0)
-sticks = st.builds(Sticks, fraction, fraction, fraction, fraction)
 
 
 def test_forward_step_follows_the_loops_of_tum_simulator() -> None:
@@ -58,46 +53,6 @@ def test_the_stick_means_speed_in_the_heading_frame() -> None:
     vx, vy, _ = states[-1].velocity_mps
     assert vx == pytest.approx(0.6 * math.cos(2.0) + 0.3 * math.sin(2.0), abs=0.01)
     assert vy == pytest.approx(0.6 * math.sin(2.0) - 0.3 * math.cos(2.0), abs=0.01)
-
-
-@settings(max_examples=8, deadline=None)
-@given(st.lists(sticks, min_size=1, max_size=4))
-def test_mirrored_sticks_give_mirrored_flight(plan: list[Sticks]) -> None:
-    def path(side: float) -> np.ndarray:
-        simulation = hovering()
-        simulation.reset(ResetRequest(position=(0.0, 0.0, 5.0)))
-        states = []
-        for each in plan:
-            mirrored = Sticks(each.vx, side * each.vy, each.vz, side * each.wz)
-            states += fly(simulation, 0.4, mirrored)[0]
-        simulation.close()
-        return np.asarray([state.position_m for state in states])
-
-    assert np.allclose(path(1.0), path(-1.0) * (1.0, -1.0, 1.0), atol=1e-6)
-
-
-@settings(max_examples=8, deadline=None)
-@given(st.lists(sticks, min_size=1, max_size=5))
-def test_no_stick_takes_it_beyond_the_limits_of_the_plant(plan: list[Sticks]) -> None:
-    simulation = hovering(command_noise=1.0)
-    simulation.reset(ResetRequest(position=(0.0, 0.0, 8.0)))
-    for each in plan:
-        for state in fly(simulation, 0.5, each)[0]:
-            vx, vy, vz = state.velocity_mps
-            # 1 m/s a full stick and axis, with noise and the overshoot of the loops.
-            assert math.hypot(vx, vy) < 1.8
-            assert abs(vz) < 0.7
-            assert math.acos(min(1.0, state.rotation[8])) < 0.75
-    simulation.close()
-
-
-def test_hands_off_it_wanders_but_stays_near() -> None:
-    simulation = hovering(command_noise=1.0, seed=4)
-    states, _ = fly(simulation, 30.0)
-    away_m = np.linalg.norm([np.subtract(s.position_m, (0, 0, 1)) for s in states], axis=1)
-    speed_mps = np.linalg.norm([s.velocity_mps for s in states], axis=1)
-    assert 0.03 < away_m.max() < 1.5
-    assert 0.01 < speed_mps[600:].mean() < 0.1
 
 
 def test_silence_is_a_hover_after_the_watchdog() -> None:
