@@ -244,11 +244,12 @@ class Lockstep:
 
     def _wire_synthesizer(self, synthesizer: Synthesizer) -> None:
         def on_intent(intent: m.Intent, now_ns: int) -> None:
-            suggestion = synthesizer.on_intent(intent, now_ns)
-            if suggestion is not None:
-                self.say("suggestion", suggestion)
+            answer = synthesizer.on_intent(intent, now_ns)
+            if answer is not None:
+                self.say("refusal" if isinstance(answer, m.Refusal) else "suggestion", answer)
 
         self.listen("pose", synthesizer.on_pose)
+        self.listen("vehicle", lambda vehicle, _now_ns: synthesizer.on_vehicle(vehicle))
         self.listen("intent", on_intent)
 
 

@@ -35,6 +35,7 @@ class Overlay:
         self.intent: m.Intent | None = None
         self._offers: deque[m.Suggestion] = deque(maxlen=OFFERS)
         self._engaged: m.Suggestion | None = None
+        self._refusal: m.Refusal | None = None
         self.undecodable = 0
 
     def on_pose(self, pose: m.Pose, now_ns: int) -> None:
@@ -57,7 +58,13 @@ class Overlay:
     def on_suggestion(self, suggestion: m.Suggestion, now_ns: int) -> None:
         """Remember what can be accepted."""
         self._offers.append(suggestion)
+        self._refusal = None
         self._arrival_ns["suggestion"] = now_ns
+
+    def on_refusal(self, refusal: m.Refusal, now_ns: int) -> None:
+        """Remember why what the operator means is not suggested."""
+        self._refusal = refusal
+        self._arrival_ns["refusal"] = now_ns
 
     def on_autopilot(self, status: m.AutopilotStatus, now_ns: int) -> None:
         """Remember who flies, and the suggestion that is being flown."""
@@ -96,6 +103,14 @@ class Overlay:
             return self._engaged
         return self._offers[-1] if self.is_fresh("suggestion", now_ns) else None
 
+    def advice(self, now_ns: int) -> str:
+        """Why there is no suggestion, or not quite the one that was meant; empty if all is well."""
+        refusal = self._refusal
+        if refusal is not None and self.is_fresh("refusal", now_ns):
+            return "" if self.is_engaged(now_ns) else f"no {refusal.label}: {refusal.reason}"
+        shown = self.shown(now_ns)
+        return (shown.note or "") if shown is not None else ""
+
     def pose_status(self, now_ns: int) -> str:
         """`ok`, `degraded` or `lost`."""
         poses = self._poses
@@ -119,6 +134,8 @@ class Overlay:
             for arrow in arrows_of(suggestion, pose, lens, config.drawn_m, config.below_m):
                 pic.draw_arrow(picture, arrow, colour)
         pic.draw_strip(picture, self._texts(suggestion, pose, now_ns))
+        if advice := self.advice(now_ns):
+            pic.draw_foot(picture, advice, pic.TEXT)
         data = pic.encode(picture, self._config.jpeg_quality)
         return msgspec.structs.replace(image, data=data)
 

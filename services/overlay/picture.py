@@ -20,6 +20,8 @@ EDGED_PX = 7.0
 """Lower arrows have no edges: little else would be left of them."""
 
 STRIP_PX = 24
+EDGE_PX = 8
+FONT, FONT_SCALE = cv2.FONT_HERSHEY_SIMPLEX, 0.42
 _SUBPIXEL_BITS = 4
 
 
@@ -48,13 +50,28 @@ def draw_arrow(picture: Picture, arrow: Arrow, colour: Colour) -> None:
 
 def draw_strip(picture: Picture, parts: list[tuple[str, Colour]]) -> None:
     """Write texts side by side on a darkened strip at the picture's top."""
-    strip = picture[:STRIP_PX]
+    _write(picture[:STRIP_PX], parts)
+
+
+def draw_foot(picture: Picture, text: str, colour: Colour) -> None:
+    """Write as much of a text as there is room for on a darkened strip at the picture's foot."""
+    room_px, width_px = max(0, picture.shape[1] - 2 * EDGE_PX), _width_px(text)
+    if width_px > room_px:
+        text = text[: max(0, len(text) * room_px // width_px - 3)] + "..."
+    _write(picture[-STRIP_PX:], [(text, colour)])
+
+
+def _write(strip: Picture, parts: list[tuple[str, Colour]]) -> None:
     cv2.addWeighted(strip, 0.35, strip, 0.0, 0.0, strip)
-    x = 8
+    x = EDGE_PX
     for text, colour in parts:
-        cv2.putText(picture, text, (x, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, 1, cv2.LINE_AA)
-        (text_width, _), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.42, 1)
-        x += text_width + 18
+        cv2.putText(strip, text, (x, 16), FONT, FONT_SCALE, colour, 1, cv2.LINE_AA)
+        x += _width_px(text) + 18
+
+
+def _width_px(text: str) -> int:
+    (width, _), _ = cv2.getTextSize(text, FONT, FONT_SCALE, 1)
+    return int(width)
 
 
 def decode(data: bytes) -> Picture | None:

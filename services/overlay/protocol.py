@@ -90,6 +90,8 @@ class State(msgspec.Struct, frozen=True, tag_field="type", tag="state"):
     progress_m: float
     cross_track_m: float
     offer: Offer | None
+    advice: str
+    """Why there is no suggestion, or not quite the one that was meant."""
     label: str
     probabilities: dict[str, float]
     vehicle_state: str

@@ -24,6 +24,7 @@ def wire(node: Node, config: Config) -> None:
     node.on("stick", core.on_stick)
     node.on("intent", core.on_intent)
     node.on("suggestion", core.on_suggestion)
+    node.on("refusal", core.on_refusal)
     node.on("autopilot", core.on_autopilot)
     node.on("vehicle", core.on_vehicle)
     node.publishes("overlay/front")
@@ -102,6 +103,7 @@ def _state(node: Node, core: Overlay, alive: list[str], pad: Standing) -> protoc
         progress_m=status.progress if status else 0.0,
         cross_track_m=status.cross_track if status else 0.0,
         offer=offer,
+        advice=core.advice(now_ns),
         label=fresh_intent.label if fresh_intent else m.NONE_LABEL,
         probabilities=fresh_intent.probabilities if fresh_intent else {},
         vehicle_state=vehicle.state if vehicle else "unknown",

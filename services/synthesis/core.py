@@ -237,7 +237,8 @@ class Synthesizer:
                 label = unfit.simpler
                 confidence *= SIMPLER_CONFIDENCE
             else:
-                return Offer(shape, confidence, "; ".join(reasons)), path
+                note = f"{label} instead of {reasons[0]}" if reasons else ""
+                return Offer(shape, confidence, note), path
         raise RefusalError("; ".join(reasons))
 
     def _continued(self, name: str, track: Track, vehicle: Vehicle) -> tuple[Shape, Array]:

@@ -35,6 +35,7 @@ GOOD: dict[str, dict[str, Any]] = {
         "confidence": 0.9,
         "heading_sector": 0,
     },
+    "Refusal": {**HEAD, "label": "arc", "reason": "it cannot be told from a line"},
     "AutopilotStatus": {
         **HEAD,
         "mode": "manual",
@@ -104,6 +105,7 @@ _OUT_OF_RANGE: dict[str, dict[str, Any]] = {
     "Stick": {"vx": 1.5},
     "Intent": {"confidence": 1.5},
     "Suggestion": {"id": 0},
+    "Refusal": {"label": ""},
     "AutopilotStatus": {"mode": "asleep"},
     "Command": {"vx": -7.0},
     "Pose": {"status": "perhaps"},

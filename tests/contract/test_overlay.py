@@ -31,6 +31,7 @@ LISTENS_TO = {
     "stick": "Stick",
     "intent": "Intent",
     "suggestion": "Suggestion",
+    "refusal": "Refusal",
     "autopilot": "AutopilotStatus",
     "vehicle": "VehicleStatus",
     "camera/front": "Image",

@@ -49,6 +49,10 @@ def suggestion(points_m: Any, *, closed: bool = False, **more: Any) -> m.Suggest
     return m.Suggestion(**(fields | more))
 
 
+def refusal(reason: str) -> m.Refusal:
+    return m.Refusal(stamp=STAMP_NS, seq=0, label="arc", reason=reason)
+
+
 def line(length_m: float = 20.0) -> list[tuple[float, float, float]]:
     return [(0.1 * i, 0.0, 1.0) for i in range(round(10 * length_m))]
 

@@ -117,6 +117,40 @@ def test_a_synthesis_that_counts_from_one_again_is_believed(core):
     assert core.shown(NOW_NS) is again
 
 
+def is_foot_written(core: Overlay, now_ns: int = NOW_NS) -> bool:
+    drawn = core.draw(scenes.image(), now_ns)
+    changed = np.abs(scenes.pixels(drawn).astype(int) - scenes.background()).max(axis=2) > 30
+    return bool(changed[-20:].mean() > 0.5)
+
+
+def test_the_reason_for_no_suggestion_is_written_until_it_is_old(core):
+    assert core.advice(NOW_NS) == ""
+    assert not is_foot_written(core)
+    core.on_refusal(scenes.refusal("it bends"), NOW_NS)
+    assert core.advice(NOW_NS) == "no arc: it bends"
+    assert is_foot_written(core)
+    assert core.advice(later("refusal")) == ""
+
+
+def test_a_suggestion_takes_the_place_of_a_refusal_and_tells_its_own_note(core):
+    core.on_refusal(scenes.refusal("it bends"), NOW_NS)
+    core.on_suggestion(PATH, NOW_NS)
+    assert core.advice(NOW_NS) == ""
+    core.on_suggestion(scenes.suggestion(scenes.line(), note="ends after 5.0 m"), NOW_NS)
+    assert core.advice(NOW_NS) == "ends after 5.0 m"
+    # What is said of the next one is no news for who flies along this one.
+    core.on_refusal(scenes.refusal("it bends"), NOW_NS)
+    core.on_autopilot(scenes.status("engaged", flown=1), NOW_NS)
+    assert core.advice(NOW_NS) == ""
+
+
+def test_a_long_reason_is_cut_to_the_pictures_width(core):
+    core.on_refusal(scenes.refusal("x" * 200), NOW_NS)
+    assert is_foot_written(core)
+    tiny = scenes.image(picture=np.zeros((10, 16, 3), np.uint8), width=16, height=10)
+    assert core.draw(tiny, NOW_NS) is not None
+
+
 def test_the_pose_of_the_pictures_moment_is_used(core):
     core.on_suggestion(PATH, NOW_NS)
     # It looked ahead when the picture was taken, and has turned round since.

@@ -16,6 +16,7 @@ export interface State {
   progress_m: number;
   cross_track_m: number;
   offer: Offer | null;
+  advice: string;
   label: string;
   probabilities: Record<string, number>;
   vehicle_state: string;

@@ -86,6 +86,7 @@ export class View {
       : offer
         ? `${percent(offer.confidence)} sure, ${offer.speed_mps.toFixed(1)} m/s, fit ${(100 * offer.fit_rms_m).toFixed(0)} cm`
         : "Fly a shape for two seconds.";
+    element("offer-advice").textContent = state.advice;
     element<HTMLButtonElement>("accept").disabled = offer === null || engaged;
   }
 
