@@ -320,6 +320,17 @@ class TestPad:
         assert (last["vx"], last["vy"], last["vz"], last["wz"]) == (0.0, 0.0, 0.0, 0.0)
         assert "application/msgpack;Stick/1" in sent.encodings
 
+    def test_the_end_of_a_primitive_is_a_button_held_for_a_moment(self, client, page):
+        sent = client.collect("console/stick")
+        page.next_state(lambda s: s["pad"] == "free")
+        begin = len(sent)
+        page.say({"type": "mark"})
+        page.wait(lambda: len(sent) > begin and not sent[-1].get("buttons"))
+        batch = list(sent)[begin:]
+        assert len(batch) >= 3
+        assert {tuple(m.get("buttons", ())) for m in batch[:-1]} == {("end",)}
+        assert all(m["vx"] == m["vy"] == m["vz"] == m["wz"] == 0.0 for m in batch)
+
     @pytest.mark.parametrize("how", ["silent", "gone"])
     def test_a_page_that_stops_or_goes_is_neutral_once(self, client, overlay, console_port, how):
         sent = client.collect("console/stick")

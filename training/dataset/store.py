@@ -12,8 +12,6 @@ Arrays of schema 1, for n primitives of N samples together:
 """
 
 import json
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +24,9 @@ from training.dataset.primitive import Primitive
 
 SCHEMA = 1
 WORDS = ("label", "operator", "family", "source")
-ARRAYS = ("times_s", "sticks", "offsets", "utc_ns", *WORDS, "provenance")
+KINDS = {"times_s": "f", "sticks": "f", "offsets": "i", "utc_ns": "i"}
+"""Of numbers, as numpy calls them; the rest is text."""
+ARRAYS = (*KINDS, *WORDS, "provenance")
 
 
 class DatasetError(OSError):
@@ -148,16 +148,16 @@ def open_set(path: Path) -> Stored:
                 )
             arrays = {name: file[name] for name in ARRAYS}
         provenance = json.loads(str(arrays.pop("provenance")))
-    except KeyError as error:
-        raise DatasetError(f"{path} lacks its array {error}; import its sources again") from None
-    except (zipfile.BadZipFile, zlib.error, EOFError, UnicodeDecodeError):
-        raise DatasetError(
-            f"{path} is cut off or no data set; take its backup or import its sources again"
-        ) from None
     except DatasetError:
         raise
-    except (ValueError, TypeError) as error:
-        raise DatasetError(f"{path} is no data set: {error}") from None
+    except KeyError as error:
+        raise DatasetError(f"{path} lacks its array {error}; import its sources again") from None
+    # What zipfile, zlib and numpy raise for bytes that are broken is of many kinds.
+    except Exception as error:
+        raise DatasetError(
+            f"{path} is no data set, or cut off ({' '.join(str(error).split())[:80]});"
+            " take its backup or import its sources again"
+        ) from None
     _require_shapes(path, arrays)
     return Stored(path, arrays, {str(k): str(v) for k, v in dict(provenance).items()})
 
@@ -178,6 +178,10 @@ def _require_shapes(path: Path, arrays: dict[str, Any]) -> None:
             raise DatasetError(
                 f"{path}: {name} has shape {arrays[name].shape}, not {shape};"
                 " import its sources again"
+            )
+        if arrays[name].dtype.kind != KINDS.get(name, "U"):
+            raise DatasetError(
+                f"{path}: {name} holds {arrays[name].dtype}; import its sources again"
             )
     if offsets[0] != 0 or offsets[-1] != samples or (np.diff(offsets) < 0).any():
         raise DatasetError(f"{path}: offsets do not divide the samples; import its sources again")

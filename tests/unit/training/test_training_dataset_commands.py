@@ -1,0 +1,148 @@
+"""`autocomplete dataset`: files in, sets, tables and figures out, errors in one line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dataset_samples import circle, performed, primitive, write_csv, write_sticks, write_vectors
+
+from cli.main import main
+from training.dataset.store import load, open_set, save
+
+
+def dataset(*words: object) -> int:
+    return main(["dataset", *map(str, words)])
+
+
+def test_import_joins_files_and_tells_what_was_wrong_with_each(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    good = write_sticks(tmp_path / "ana.mcap", performed((circle(), "circle")))
+    bad = write_csv(tmp_path / "ben.csv", performed((circle(), "cross"), (circle(30), "square")))
+    bad.write_text(bad.read_text() + "spam\n")
+    empty = tmp_path / "empty.csv"
+    empty.touch()
+    out = tmp_path / "set.npz"
+    assert dataset("import", good, bad, empty, "--out", out) == 0
+    assert [(p.label, p.operator) for p in load(out)] == [("arc", "ana"), ("sine", "ben")]
+    told = capsys.readouterr().err
+    assert f"{bad}: row 272: column secs: 'spam' is no number; the row is left out\n" in told
+    assert "shorter than 1 s; dropped" in told
+    assert f"{empty} is empty" in told
+
+
+def test_import_replaces_no_set_but_adds_to_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_sticks(tmp_path / "ana.mcap", performed((circle(), "circle")))
+    out = tmp_path / "set.npz"
+    assert dataset("import", path, "--out", out) == 0
+    assert dataset("import", path, "--out", out) == 1
+    assert "is there already; choose another --out, or --append" in capsys.readouterr().err
+    assert dataset("import", path, "--out", out, "--append", "--operator", "ben") == 0
+    assert [p.operator for p in load(out)] == ["ana", "ben"]
+    assert open_set(out).provenance["made"] == f"import {path}; import {path}"
+
+
+def test_the_preset_of_the_thesis_pads_to_200(tmp_path: Path) -> None:
+    path = write_vectors(tmp_path / "v.csv", [(circle(size), 1) for size in (44, 150, 300, 401)])
+    out = tmp_path / "set.npz"
+    assert dataset("import", path, "--out", out, "--preset", "thesis") == 0
+    assert [len(p) for p in load(out)] == [200, 200]
+    other = ("--shortest", "0.5s", "--longest", "400", "--length", "200", "--over", "drop")
+    assert dataset("import", path, "--out", tmp_path / "b.npz", *other) == 0
+    assert [len(p) for p in load(tmp_path / "b.npz")] == [44, 150]
+
+
+def test_nothing_usable_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("hello\n")
+    assert dataset("import", path, "--out", tmp_path / "a.npz") == 1
+    assert "nothing was written" in capsys.readouterr().err
+    assert not (tmp_path / "a.npz").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["--axes", "up"], "argument --axes: no stick 'up'"),
+        (["--buttons", "cross"], "argument --buttons: 'cross': write BUTTON=LABEL"),
+        (["--buttons", "cross=loop"], "argument --buttons: no label 'loop'; there are line"),
+        (["--classes", "loop"], "argument --classes: no label 'loop'"),
+        (["--rate", "0"], "argument --rate: '0': use Hz"),
+        (["--shortest", "x"], "argument --shortest: 'x': use samples"),
+        (["--label", "loop"], "argument --label: invalid choice: 'loop'"),
+        (["--operator", " "], "argument --operator: it is empty"),
+        (["--out", "set.csv"], "argument --out: set.csv: name a file that ends in .npz"),
+    ],
+)
+def test_wrong_usage_exits_with_2_and_names_the_option(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], reason: str
+) -> None:
+    path = write_csv(tmp_path / "a.csv", performed((circle(), "circle")))
+    with pytest.raises(SystemExit) as exit_:
+        dataset("import", path, "--out", tmp_path / "a.npz", *words)
+    assert exit_.value.code == 2
+    assert reason in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["--over", "drop"], "--over and --pad need a --length"),
+        (["--ignored-is-none"], "--ignored-is-none goes with --from-flights"),
+    ],
+)
+def test_options_that_need_others_say_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], reason: str
+) -> None:
+    path = write_csv(tmp_path / "a.csv", performed((circle(), "circle")))
+    assert dataset("import", path, "--out", tmp_path / "a.npz", *words) == 2
+    assert reason in capsys.readouterr().err
+
+
+def test_check_tells_each_finding_and_its_exit_code_tells_whether_there_is_any(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sound, faulty, broken = (tmp_path / name for name in ("a.npz", "b.npz", "c.npz"))
+    save(sound, [primitive()])
+    save(faulty, [primitive(), primitive(times_s=5.0 * np.arange(150) / 50.0)])
+    broken.write_bytes(sound.read_bytes()[:100])
+    assert dataset("check", sound) == 0
+    assert "1 primitives, nothing is wrong" in capsys.readouterr().out
+    assert dataset("check", sound, faulty, broken) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert f"{faulty}: row 1: arc by ana: 10.0 Hz is outside 20 to 100 Hz" in lines
+    assert any(line.startswith(f"{broken} is no data set, or cut off") for line in lines)
+
+
+def test_stats_count_and_draw(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, figure = tmp_path / "a.npz", tmp_path / "a.png"
+    save(path, [primitive(), primitive(label="sine", operator="ben"), primitive(label="none")])
+    assert dataset("stats", path, "--figure", figure) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert ["arc", "1", "1", "150", "/", "150", "/", "150"] in [line[:8] for line in lines]
+    assert ["ben", "1", "0", "0", "1", "0", "0", "1", "150", "50"] in lines
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    save(path, [])
+    assert dataset("stats", path) == 1
+    assert dataset("stats", figure) == 1
+
+
+def test_generate_makes_the_same_set_for_the_same_seed(tmp_path: Path) -> None:
+    small = ("--operators", 3, "--multiple", 0.004, "--seed", 7)
+    for name in ("a.npz", "b.npz"):
+        assert dataset("generate", "--out", tmp_path / name, *small) == 0
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    found = load(tmp_path / "a.npz")
+    assert {p.label for p in found} == {"line", "arc", "sine", "helix"}
+    assert len({p.operator for p in found}) == 3
+    assert dataset("check", tmp_path / "a.npz") == 0
+
+
+@pytest.mark.parametrize("command", ["import", "record", "generate", "stats", "check"])
+def test_help_teaches_by_examples(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        dataset(command, "--help")
+    assert exit_.value.code == 0
+    assert f"autocomplete dataset {command} " in capsys.readouterr().out.split("examples:")[1]
