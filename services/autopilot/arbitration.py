@@ -33,12 +33,17 @@ class Event(StrEnum):
     VEHICLE_LANDED = "vehicle_landed"
     VEHICLE_EMERGENCY = "vehicle_emergency"
     """It cut its motors."""
+    VEHICLE_CHANGED = "vehicle_changed"
+    """It is of another plant now: it was reset."""
+    BATTERY_EMPTY = "battery_empty"
     TAKEOFF_FAILED = "takeoff_failed"
     """It did not obey in time."""
 
     STICK_LOST = "stick_lost"
     STICK_GONE = "stick_gone"
     """Lost for so long that nobody may come back."""
+    STICK_STUCK = "stick_stuck"
+    """Deflected, and not moved at all for longer than a hand can."""
     POSE_LOST = "pose_lost"
     POSE_GONE = "pose_gone"
 
@@ -69,9 +74,12 @@ _ROWS: dict[Event, tuple[FlightMode | None, ...]] = {
     Event.VEHICLE_LANDING: (None, _H, None, None, None),
     Event.VEHICLE_LANDED: (_L, _L, _L, None, None),
     Event.VEHICLE_EMERGENCY: (_X, _X, _X, _X, None),
+    Event.VEHICLE_CHANGED: (None, _H, None, None, None),
+    Event.BATTERY_EMPTY: (_H, _H, _H, None, None),
     Event.TAKEOFF_FAILED: (None, None, None, _H, None),
     Event.STICK_LOST: (_H, _H, None, None, None),
     Event.STICK_GONE: (_H, _H, _H, None, None),
+    Event.STICK_STUCK: (_H, None, None, None, None),
     Event.POSE_LOST: (None, _H, None, None, None),
     Event.POSE_GONE: (None, _H, _H, None, None),
     Event.FINISHED: (None, _H, None, None, None),
@@ -87,6 +95,7 @@ TABLE: Mapping[tuple[FlightMode, Event], FlightMode | None] = {
 _ACTIONS: dict[Event, CommandAction] = {
     Event.TAKEOFF: "takeoff",
     Event.LAND: "land",
+    Event.BATTERY_EMPTY: "land",
     Event.STICK_GONE: "land",
     Event.POSE_GONE: "land",
     Event.EMERGENCY: "emergency",

@@ -3,6 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 
+from common.fence import MAX_HEIGHT_M, RADIUS_M
 from common.sticks import DEAD_BAND
 from common.topics import TOPICS
 
@@ -34,6 +35,17 @@ class Config:
     """An engaged path is given up when the last pose is older than this, s."""
     land_after_s: float = 5.0
     """The vehicle lands when a loss has lasted this long, s."""
+    steady_s: float = 1.0
+    """Sticks and poses that came back must have been steady this long before a place is kept, s."""
+    stuck_s: float = 20.0
+    """Deflected sticks that have not moved at all for so long are a broken pad, s. A hand trembles;
+    only a key, or a stick at its stop, rests like that."""
+    battery_low: float = 0.2
+    """With this charge or less no path and no take-off is begun, 0 to 1."""
+    battery_empty: float = 0.05
+    """With this charge or less the vehicle lands as soon as the sticks rest, 0 to 1."""
+    slew_ps: float = 5.0
+    """How fast the autopilot's own sticks move at most, fractions of full stick a second."""
     takeoff_timeout_s: float = 3.0
     """`takeoff` is sent until the vehicle obeys, at most this long, s."""
 
@@ -45,39 +57,41 @@ class Config:
     """A path is given up when the vehicle is farther than this from it, m."""
     min_height_m: float = 0.2
     """Paths and engaged flight stay above this height, m."""
-    max_height_m: float = 10.0
+    max_height_m: float = MAX_HEIGHT_M
     """Paths and engaged flight stay below this height, m."""
+    fence_radius_m: float = RADIUS_M
+    """Paths and engaged flight stay this near to the world's origin, m."""
 
     max_speed_fraction: float = 0.9
-    """Highest path speed, fraction of full stick; the rest is left for corrections."""
+    """Highest path speed, share of what the sticks can do; the rest is left for corrections."""
     acceleration_mps2: float = 0.6
     """Speed-up and slow-down along the path, m/s2."""
     lateral_acceleration_mps2: float = 1.0
     """Limits the speed in curves, m/s2."""
-    plane_p: float = 1.2
-    """Plane PID, m/s per m."""
-    plane_i: float = 0.15
-    """Plane PID, m/s per m s."""
-    plane_d: float = 0.3
-    """Plane PID, m/s per m/s."""
-    vertical_p: float = 1.2
-    """Vertical PID, m/s per m."""
+    plane_p: float = 3.0
+    """Plane PID, m/s2 per m."""
+    plane_i: float = 0.3
+    """Plane PID, m/s2 per m s. The wind is not its work: disturbance.py knows it."""
+    plane_d: float = 3.2
+    """Plane PID, m/s2 per m/s."""
+    vertical_p: float = 3.0
+    """Vertical PID, m/s2 per m."""
     vertical_i: float = 0.3
-    """Vertical PID, m/s per m s."""
-    vertical_d: float = 0.1
-    """Vertical PID, m/s per m/s."""
-    yaw_p: float = 1.2
-    """Yaw PID, rad/s per rad."""
+    """Vertical PID, m/s2 per m s."""
+    vertical_d: float = 3.0
+    """Vertical PID, m/s2 per m/s."""
+    yaw_p: float = 2.4
+    """Yaw PID, rad/s2 per rad."""
     yaw_i: float = 0.2
-    """Yaw PID, rad/s per rad s."""
-    yaw_d: float = 0.1
-    """Yaw PID, rad/s per rad/s."""
+    """Yaw PID, rad/s2 per rad s."""
+    yaw_d: float = 2.2
+    """Yaw PID, rad/s2 per rad/s."""
 
     def __post_init__(self) -> None:
         gains = {f"{axis}_{term}" for axis in ("plane", "vertical", "yaw") for term in "pid"}
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if field.name in gains | {"min_height_m"}:
+            if field.name in gains | {"min_height_m", "battery_low", "battery_empty"}:
                 if value < 0.0:
                     raise ValueError(f"{field.name} must not be negative, is {value}")
             elif value <= 0.0:
@@ -88,7 +102,7 @@ class Config:
                     f"{name} must be {SHORTEST_PERIOD_S} to {LONGEST_PERIOD_S} s,"
                     f" is {getattr(self, name)}"
                 )
-        for name in ("dead_band", "max_speed_fraction"):
+        for name in ("dead_band", "max_speed_fraction", "battery_low", "battery_empty"):
             if getattr(self, name) >= 1.0:
                 raise ValueError(f"{name} must be below 1, is {getattr(self, name)}")
         if self.max_height_m <= self.min_height_m:

@@ -1,17 +1,21 @@
-"""The autopilot: links and poses watched, decisions answered, sticks passed on or a path flown.
+"""The autopilot: links and poses watched, decisions answered, and who flies commands the vehicle.
 
 Pure: every method gets the receiver's monotonic time `now_ns`, and the stamp for what goes out.
 """
 
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from common import messages as m
 from common.clock import NS_PER_S, nanoseconds, seconds
 from services.autopilot.arbitration import Event, State
 from services.autopilot.config import Config
-from services.autopilot.follower import Follower, Sticks
+from services.autopilot.control import NEUTRAL, Controller, Sticks
+from services.autopilot.fence import Fence
+from services.autopilot.follower import Follower, PathFollower
 from services.autopilot.guard import Guard
+from services.autopilot.hold import Hold
 from services.autopilot.link import StickLink
 from services.autopilot.path import BadPathError
 
@@ -23,7 +27,12 @@ SUGGESTIONS = 8
 MAX_DT_S = 0.1
 """Longest time that one step of the follower integrates over."""
 
-_NEUTRAL = Sticks(0.0, 0.0, 0.0, 0.0)
+DEFAULT_PLANT: m.Plant = "tum"
+"""Until the vehicle says what it is."""
+
+Follow = Callable[[m.Suggestion, m.Pose, Controller, Config], PathFollower]
+"""Makes what flies an accepted suggestion; raises BadPathError if it cannot be flown from here."""
+
 _AIRBORNE = ("taking_off", "flying", "landing")
 _DECISIONS: dict[m.DecideAction, Event] = {
     "accept": Event.ACCEPT,
@@ -48,26 +57,34 @@ class Autopilot:
     Args:
         config: limits and gains.
         now_ns: the monotonic time of the start.
+        follow: how accepted paths are flown.
     """
 
-    def __init__(self, config: Config, now_ns: int) -> None:
+    def __init__(self, config: Config, now_ns: int, follow: Follow = Follower) -> None:
         self._config = config
+        self._follow = follow
+        self._fence = Fence(config)
         self._state = State()
-        self._link = StickLink(config.stick_loss_s, config.dead_band)
-        self._guard = Guard()
+        self._link = StickLink(config.stick_loss_s, config.dead_band, config.stuck_s)
+        self._guard = Guard(config.slew_ps)
+        self._controller = Controller(DEFAULT_PLANT, config)
         self._pose: m.Pose | None = None
         self._pose_ns: int | None = None
+        self._poses_since_ns = now_ns
         self._vehicle: m.VehicleStatus | None = None
         self._suggestions: OrderedDict[int, tuple[m.Suggestion, int]] = OrderedDict()
         self._answers: OrderedDict[int, m.DecideReply] = OrderedDict()
-        self._follower: Follower | None = None
+        self._follower: PathFollower | None = None
+        self._hold: Hold | None = None
         self._stepped_ns = now_ns
+        self._observed_ns = now_ns
         self._took_off_ns = now_ns
         self._airborne_ns = now_ns
         self._status_due_ns = now_ns
         self._sent_ns = now_ns
         self._announced: tuple[State, int] | None = None
         self._commanded: State | None = None
+        self._command: m.Command | None = None
 
     @property
     def mode(self) -> m.FlightMode:
@@ -90,6 +107,9 @@ class Autopilot:
         fresh = self._pose_is_fresh(now_ns)
         if pose.status == "lost" or (fresh and self._pose and pose.seq < self._pose.seq):
             return
+        if not fresh:
+            self._poses_since_ns = now_ns
+            self._controller.disturbance.pause()
         self._pose, self._pose_ns = pose, now_ns
 
     def on_suggestion(self, suggestion: m.Suggestion, now_ns: int) -> None:
@@ -102,6 +122,9 @@ class Autopilot:
     def on_vehicle(self, vehicle: m.VehicleStatus, now_ns: int) -> None:
         """Take the vehicle's own state in."""
         self._vehicle = vehicle
+        if vehicle.plant != self._controller.plant_name:
+            self._controller = Controller(vehicle.plant, self._config)
+            self._happen(Event.VEHICLE_CHANGED, now_ns)
         self._watch(now_ns)
 
     def decide(self, request: m.DecideRequest, now_ns: int) -> m.DecideReply:
@@ -126,6 +149,7 @@ class Autopilot:
     def step(self, now_ns: int, stamp_ns: int) -> Output:
         """One period: failsafes, then the command, unless a stick just made one; the status."""
         self._watch(now_ns)
+        self._observe(now_ns)
         silent = now_ns - self._sent_ns >= nanoseconds(self._config.step_period_s)
         return self._output(now_ns, stamp_ns, due=self._state.mode != "manual" or silent)
 
@@ -142,6 +166,11 @@ class Autopilot:
             missing.append("no pose")
         if self._vehicle is None:
             missing.append("no vehicle")
+        elif self._battery <= self._config.battery_low:
+            missing.append(f"battery {self._battery:.0%}")
+        still_s = self._link.still_s(now_ns)
+        if still_s > self._config.stuck_s / 2.0:
+            missing.append(f"the sticks have not moved for {still_s:.0f} s")
         if self._guard.repaired:
             missing.append(f"{self._guard.repaired} commands repaired")
         detail = ", ".join([f"{self._state.mode}: {self._state.reason}", *missing])
@@ -160,6 +189,9 @@ class Autopilot:
             self._airborne_ns = now_ns
         if self._state.mode != "engaged":
             self._follower = None
+        if self._state.mode in ("manual", "landed", "emergency"):
+            self._controller.relax()
+        self._hold = None
 
     def _watch(self, now_ns: int) -> None:
         """The failsafes, and what the vehicle says of itself; every entry passes here first."""
@@ -179,6 +211,11 @@ class Autopilot:
             self._happen(Event.VEHICLE_FLYING, now_ns)
         if not self._link.is_live(now_ns):
             self._happen(Event.STICK_LOST, now_ns)
+        elif self._link.is_stuck(now_ns):
+            self._happen(Event.STICK_STUCK, now_ns)
+        # Whoever still steers may choose where it comes down.
+        if self._battery <= config.battery_empty and not self._link.commands(now_ns):
+            self._happen(Event.BATTERY_EMPTY, now_ns)
         if self._older(self._pose_ns, now_ns, config.hold_s):
             self._happen(Event.POSE_LOST, now_ns)
         if self._state.mode == "hover":
@@ -202,6 +239,8 @@ class Autopilot:
                 return str(told)
             if mode == "emergency" and told != "landed":
                 return mode
+        if event in (Event.TAKEOFF, Event.ACCEPT) and self._battery <= self._config.battery_low:
+            return "battery_low"
         # The operator lets go first: a stick still held would take over in the same step. Sticks
         # that do not count cannot, so they keep nobody from landing.
         accepting = event is Event.ACCEPT
@@ -226,9 +265,8 @@ class Autopilot:
             return "stale"
         if self._pose is None or not self._pose_is_fresh(now_ns):
             return Event.POSE_LOST.value
-        plant = self._vehicle.plant if self._vehicle else "tum"
         try:
-            self._follower = Follower(accepted, self._pose, plant, self._config)
+            self._follower = self._follow(accepted, self._pose, self._controller, self._config)
             self._stepped_ns = now_ns
         except BadPathError as error:
             return str(error)
@@ -240,8 +278,27 @@ class Autopilot:
             sticks = self._sticks(now_ns)
             self._commanded = self._state
             self._sent_ns = now_ns
-            command = self._guard.command(sticks, self._action(), self._state.mode, stamp_ns)
+            command = self._command = self._guard.command(
+                sticks,
+                self._action(),
+                self._state.mode,
+                stamp_ns,
+                now_ns=now_ns,
+                live=self._link.is_live(now_ns),
+            )
         return Output(command, self._status(now_ns, stamp_ns))
+
+    def _observe(self, now_ns: int) -> None:
+        """Let the controller see what came of the last command."""
+        dt_s = min(seconds(now_ns - self._observed_ns), MAX_DT_S)
+        self._observed_ns = now_ns
+        flies = self._vehicle is not None and self._vehicle.state == "flying"
+        if self._command is None or self._pose is None or not self._pose_is_fresh(now_ns):
+            return
+        if flies:
+            self._controller.observe(self._pose, self._command, dt_s)
+        else:
+            self._controller.disturbance.pause()
 
     def _action(self) -> m.CommandAction:
         """What the vehicle is told; once it has cut its motors, it may say that it lies still."""
@@ -251,28 +308,49 @@ class Autopilot:
         return self._state.action
 
     def _sticks(self, now_ns: int) -> Sticks:
-        """The operator's sticks in manual, the follower's while engaged, neutral otherwise."""
+        """The operator's sticks in manual; the follower's while engaged; a place kept in hover."""
         stick = self._link.newest
         if self._state.mode == "manual" and stick is not None and self._link.commands(now_ns):
             return Sticks(stick.vx, stick.vy, stick.vz, stick.wz)
-        if self._follower is None or not self._pose_is_fresh(now_ns):
-            return _NEUTRAL
-        return self._followed(self._follower, now_ns)
-
-    def _followed(self, follower: Follower, now_ns: int) -> Sticks:
-        assert self._pose is not None
-        assert self._pose_ns is not None
+        pose, arrival_ns = self._pose, self._pose_ns
+        if pose is None or arrival_ns is None or not self._pose_is_fresh(now_ns):
+            return NEUTRAL
+        age_s = seconds(now_ns - arrival_ns)
         dt_s = min(seconds(now_ns - self._stepped_ns), MAX_DT_S)
         self._stepped_ns = now_ns
-        sticks = follower.sticks(self._pose, seconds(now_ns - self._pose_ns), dt_s)
-        height_m = self._pose.position[2]
+        if self._follower is not None:
+            sticks = self._follower.sticks(pose, age_s, dt_s)
+            self._watch_flight(self._follower, pose, now_ns)
+            if self._state.mode == "engaged":
+                return sticks
+        if self._state.mode == "hover" and self._may_hold(now_ns):
+            self._hold = self._hold or Hold(pose, self._controller)
+            return self._hold.sticks(pose, age_s, dt_s)
+        self._hold = None
+        return NEUTRAL
+
+    def _watch_flight(self, follower: PathFollower, pose: m.Pose, now_ns: int) -> None:
         if follower.finished:
             self._happen(Event.FINISHED, now_ns)
         elif follower.cross_track_m > self._config.leave_path_m:
             self._happen(Event.OFF_PATH, now_ns)
-        elif not self._config.min_height_m <= height_m <= self._config.max_height_m:
+        elif self._fence.is_left(pose.position):
             self._happen(Event.GEOFENCE, now_ns)
-        return sticks if self._state.mode == "engaged" else _NEUTRAL
+
+    def _may_hold(self, now_ns: int) -> bool:
+        """Whether a place may be kept: in flight, with steady links: what is new may jump."""
+        since_ns = self._link.steady_since_ns(now_ns)
+        return (
+            self._state.action == "fly"
+            and self._vehicle is not None
+            and self._vehicle.state == "flying"
+            and since_ns is not None
+            and self._older(max(since_ns, self._poses_since_ns), now_ns, self._config.steady_s)
+        )
+
+    @property
+    def _battery(self) -> float:
+        return 1.0 if self._vehicle is None else self._vehicle.battery
 
     def _status(self, now_ns: int, stamp_ns: int) -> m.AutopilotStatus | None:
         follower = self._follower

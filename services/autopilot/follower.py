@@ -1,34 +1,50 @@
-"""Flies a path: feed-forward of its speed and turn, one PID each for plane, height and yaw."""
+"""Flies a path: which place of it is due now, how fast, and when it ends."""
 
 import math
-from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from common.frames import Array, world_to_heading, wrap_angle, yaw_of
+from common.frames import Array
 from common.messages import Pose, Suggestion
-from common.sticks import FULL_STICK
 from services.autopilot.config import Config
+from services.autopilot.control import Controller, Reference, Sticks
+from services.autopilot.fence import Fence
 from services.autopilot.path import BadPathError, Path
-from services.autopilot.pid import Gains, Pid, limit_norm
-from services.autopilot.plants import LAGS
 
 FINISH_M = 0.1
 """An open path is finished this near to its end; the vehicle coasts about as far."""
 MIN_SPEED_MPS = 0.15
 """Slowest path speed: the end of a path is reached, not approached for ever."""
-PLANE_LIMIT_MPS = 0.5
-"""Highest speed at which the plane PID moves the vehicle back to the path."""
+SPEED_STEPS = 16
+"""Speeds that are tried at each place of the path."""
+REPLAN_S = 0.5
+"""The speeds are planned anew this often, as the wind becomes known."""
+SPEED_LEAD_MPS = 0.3
+"""The speed asked for is at most this much above the vehicle's own: wind may hold it back."""
+YAW_LOOK_S = 0.2
+"""The change of the path's turn is taken over this time ahead."""
 
 
-@dataclass(frozen=True)
-class Sticks:
-    """Fractions of full stick: forward, left, up, counter-clockwise."""
+class PathFollower(Protocol):
+    """What the autopilot needs of whoever flies an accepted suggestion."""
 
-    vx: float
-    vy: float
-    vz: float
-    wz: float
+    suggestion: Suggestion
+    cross_track_m: float
+
+    @property
+    def progress_m(self) -> float:
+        """How far it flew along the path; laps add up."""
+        ...
+
+    @property
+    def finished(self) -> bool:
+        """Whether it is at the end of an open path."""
+        ...
+
+    def sticks(self, pose: Pose, age_s: float, dt_s: float) -> Sticks:
+        """The sticks for now."""
+        ...
 
 
 class Follower:
@@ -37,37 +53,33 @@ class Follower:
     Args:
         suggestion: what was accepted.
         pose: where the vehicle is; the flight starts at the path's point nearest to it.
-        plant: a key of `FULL_STICK`.
-        config: limits and gains.
+        controller: of the vehicle.
+        config: limits.
 
     Raises:
-        BadPathError: if the path cannot be flown from here: too short, too low, too high, too far.
+        BadPathError: if the path cannot be flown from here: too short, too far, out of bounds.
     """
 
-    def __init__(self, suggestion: Suggestion, pose: Pose, plant: str, config: Config) -> None:
+    def __init__(
+        self, suggestion: Suggestion, pose: Pose, controller: Controller, config: Config
+    ) -> None:
         self.suggestion = suggestion
         self._config = config
-        self._full = FULL_STICK[plant]
-        self._lags = LAGS[plant]
+        self._controller = controller
         self._path = Path(suggestion.path, suggestion.closed)
-        heights = self._path.points_m[:, 2]
-        if heights.min() < config.min_height_m or heights.max() > config.max_height_m:
+        if not Fence(config).holds(self._path.points_m):
             raise BadPathError("geofence")
         self._start_m = self._path.nearest_start_m(pose.position, config.start_distance_m)
         self._distance_m = self._start_m
-        self.cross_track_m = math.dist(self._path.at(self._distance_m).position_m, pose.position)
+        here = self._path.at(self._distance_m)
+        self.cross_track_m = math.dist(here.position_m, pose.position)
         if self.cross_track_m > config.start_distance_m:
             raise BadPathError("too_far")
-        tangent = self._path.at(self._distance_m).tangent
-        along = sum(v * t for v, t in zip(pose.velocity, tangent, strict=True))
+        along = sum(v * t for v, t in zip(pose.velocity, here.tangent, strict=True))
         self._speed_mps = min(max(along, MIN_SPEED_MPS), suggestion.speed)
-        self._profile = self._speed_profile()
-        self._plane = Pid(Gains(config.plane_p, config.plane_i, config.plane_d, PLANE_LIMIT_MPS), 2)
-        up = self._full.up_mps
-        self._up = Pid(Gains(config.vertical_p, config.vertical_i, config.vertical_d, up), 1)
-        turn = self._full.yaw_radps
-        self._yaw = Pid(Gains(config.yaw_p, config.yaw_i, config.yaw_d, turn), 1)
-        self._plane_saturated = self._up_saturated = self._yaw_saturated = False
+        self._limits_mps = self._limits()
+        self._profile_mps = self._profile()
+        self._planned_s = 0.0
 
     @property
     def progress_m(self) -> float:
@@ -88,72 +100,101 @@ class Follower:
             dt_s: time since the last call.
         """
         position = [p + v * age_s for p, v in zip(pose.position, pose.velocity, strict=True)]
-        yaw_rate_radps = pose.angular_velocity[2]
-        yaw_rad = yaw_of(pose.orientation) + yaw_rate_radps * age_s
         self._distance_m = self._path.advanced_m(self._distance_m, position)
         here = self._path.at(self._distance_m)
-        error = [h - p for h, p in zip(here.position_m, position, strict=True)]
-        self.cross_track_m = math.hypot(*error)
+        self.cross_track_m = math.dist(here.position_m, position)
+        self._planned_s += dt_s
+        if self._planned_s >= REPLAN_S:
+            self._planned_s = 0.0
+            self._profile_mps = self._profile()
 
-        lags = self._lags
-        self._speed_mps = min(
-            self._speed_mps + self._config.acceleration_mps2 * dt_s,
-            self._speed_at(self._distance_m + self._speed_mps * lags.plane_s),
+        late_s = self._controller.plant.plane.late_s
+        before = self._speed_mps
+        along = sum(v * t for v, t in zip(pose.velocity, here.tangent, strict=True))
+        self._speed_mps = speed = min(
+            before + self._config.acceleration_mps2 * dt_s,
+            self._speed_at(self._distance_m + before * late_s),
+            max(along, 0.0) + SPEED_LEAD_MPS,
         )
-        speed = self._speed_mps
-        # A speed that lags by T is right now if it is commanded T early.
-        plane_ahead = self._path.at(self._distance_m + speed * lags.plane_s)
-        up_ahead = self._path.at(self._distance_m + speed * lags.vertical_s)
-        yaw_ahead = self._path.at(self._distance_m + speed * lags.yaw_s)
-        rate = [speed * t - v for t, v in zip(here.tangent, pose.velocity, strict=True)]
-
-        east, north = self._plane.correction(error[:2], rate[:2], dt_s, self._plane_saturated)
-        (up,) = self._up.correction(error[2:], rate[2:], dt_s, self._up_saturated)
-        turn_here = speed * here.yaw_rate_radpm
-        (turn,) = self._yaw.correction(
-            [wrap_angle(here.yaw_rad - yaw_rad)],
-            [turn_here - yaw_rate_radps],
-            dt_s,
-            self._yaw_saturated,
+        ahead = self._path.at(self._distance_m + speed * late_s)
+        gain = (speed - before) / dt_s if dt_s > 0.0 else 0.0
+        gain = max(-self._config.acceleration_mps2, min(self._config.acceleration_mps2, gain))
+        turn_soon = self._path.at(self._distance_m + speed * YAW_LOOK_S).yaw_rate_radpm
+        level = math.hypot(here.tangent[0], here.tangent[1])
+        reference = Reference(
+            position_m=here.position_m,
+            velocity_mps=_scaled(here.tangent, speed),
+            acceleration_mps2=_sum(
+                _scaled(ahead.curvature_1pm, speed * speed), _scaled(ahead.tangent, gain)
+            ),
+            yaw_rad=here.yaw_rad,
+            yaw_rate_radps=speed * here.yaw_rate_radpm,
+            yaw_acceleration_radps2=speed * (turn_soon - here.yaw_rate_radpm) / YAW_LOOK_S,
+            along=(here.tangent[0] / level, here.tangent[1] / level) if level > 0.1 else (0.0, 0.0),
         )
-        forward, left = world_to_heading(
-            speed * plane_ahead.tangent[0] + east, speed * plane_ahead.tangent[1] + north, yaw_rad
-        )
-        wanted = [forward / self._full.forward_mps, left / self._full.left_mps]
-        vx, vy = limit_norm(wanted, 1.0)
-        self._plane_saturated = [vx, vy] != wanted
-        vz = (speed * up_ahead.tangent[2] + up) / self._full.up_mps
-        wz = (speed * yaw_ahead.yaw_rate_radpm + turn) / self._full.yaw_radps
-        self._up_saturated, self._yaw_saturated = abs(vz) > 1.0, abs(wz) > 1.0
-        return Sticks(vx, vy, max(-1.0, min(1.0, vz)), max(-1.0, min(1.0, wz)))
+        return self._controller.sticks(pose, age_s, reference, dt_s)
 
     def _speed_at(self, distance_m: float) -> float:
         within = distance_m % self._path.length_m if self._path.closed else distance_m
-        index = min(int(within / self._path.spacing_m), len(self._profile) - 1)
-        return float(self._profile[index])
+        index = min(int(within / self._path.spacing_m), len(self._profile_mps) - 1)
+        return float(self._profile_mps[index])
 
-    def _speed_profile(self) -> Array:
-        """The speed allowed at each sample by full stick, curves, climbs and the end, in m/s."""
-        config, path, full = self._config, self._path, self._full
+    def _limits(self) -> Array:
+        """The speed that the path allows at each sample, in m/s: turns, climbs, curves."""
+        config, path, plant = self._config, self._path, self._controller.plant
         share = config.max_speed_fraction
-        across = np.maximum(np.hypot(path.tangents[:, 0], path.tangents[:, 1]), 1e-6)
-        climb = np.maximum(np.abs(path.tangents[:, 2]), 1e-6)
-        curvature = np.maximum(path.curvature_1pm, 1e-6)
+        rise = np.maximum(np.abs(path.tangents[:, 2]), 1e-6)
+        curvature = np.maximum(np.linalg.norm(path.curvatures_1pm, axis=1), 1e-6)
         turning = np.maximum(np.abs(path.yaw_rates_radpm), 1e-6)
-        limits = [
-            np.full(len(across), self.suggestion.speed),
-            share * min(full.forward_mps, full.left_mps) / across,
-            share * full.up_mps / climb,
-            share * full.yaw_radps / turning,
-            np.sqrt(config.lateral_acceleration_mps2 / curvature),
-        ]
-        profile: Array = np.maximum(np.min(limits, axis=0), MIN_SPEED_MPS)
+        limits: Array = np.min(
+            [
+                np.full(len(rise), self.suggestion.speed),
+                share * min(plant.up.top_speed, plant.down.top_speed) / rise,
+                share * plant.yaw.top_speed / turning,
+                np.sqrt(config.lateral_acceleration_mps2 / curvature),
+            ],
+            axis=0,
+        )
+        return limits
+
+    def _profile(self) -> Array:
+        """The speed at each sample, in m/s, that the sticks can keep up in the present wind."""
+        config, path, plane = self._config, self._path, self._controller.plant.plane
+        speeds = np.linspace(MIN_SPEED_MPS, max(self.suggestion.speed, MIN_SPEED_MPS), SPEED_STEPS)
+        wind = np.asarray(self._controller.disturbance.plane_mps2)
+        # The sticks that each speed needs at each sample, as the speed that they ask for.
+        needed = (
+            speeds[:, None, None] * path.tangents[None, :, :2]
+            + (speeds[:, None, None] ** 2 * path.curvatures_1pm[None, :, :2] - wind) / plane.rate_ps
+        )
+        needed_mps = np.linalg.norm(needed, axis=2)
+        limit_mps = config.max_speed_fraction * plane.top_speed
+        # The fastest that can be kept along with all slower ones; the slowest is never refused.
+        last = np.maximum(np.cumprod(needed_mps <= limit_mps, axis=0).sum(axis=0), 1) - 1
+        after, samples = np.minimum(last + 1, SPEED_STEPS - 1), np.arange(len(last))
+        rise = np.maximum(needed_mps[after, samples] - needed_mps[last, samples], 1e-6)
+        share = np.clip((limit_mps - needed_mps[last, samples]) / rise, 0.0, 1.0)
+        fastest = speeds[last] + share * (speeds[after] - speeds[last])
+        profile: Array = np.maximum(np.minimum(self._limits_mps, fastest), MIN_SPEED_MPS)
         if not path.closed:
             profile[-1] = MIN_SPEED_MPS
-        gain = 2.0 * config.acceleration_mps2 * path.spacing_m
-        for _ in range(2 if path.closed else 1):
-            for index in range(len(profile) - 2, -1, -1):
-                profile[index] = min(profile[index], math.sqrt(profile[index + 1] ** 2 + gain))
-            if path.closed:
-                profile[-1] = profile[0]
-        return profile
+            return self._braked(profile)
+        # Twice round: what comes after the join slows down what is before it.
+        return self._braked(np.concatenate([profile, profile]))[: len(profile)]
+
+    def _braked(self, profile: Array) -> Array:
+        """The profile with room to slow down: v squared falls by 2 a a metre at most."""
+        fall = 2.0 * self._config.acceleration_mps2 * self._path.spacing_m
+        climb = fall * np.arange(len(profile))
+        lowest = np.minimum.accumulate((profile**2 + climb)[::-1])[::-1]
+        return np.asarray(np.sqrt(lowest - climb), dtype=np.float64)
+
+
+def _scaled(vector: tuple[float, float, float], by: float) -> tuple[float, float, float]:
+    return vector[0] * by, vector[1] * by, vector[2] * by
+
+
+def _sum(
+    one: tuple[float, float, float], other: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    return one[0] + other[0], one[1] + other[1], one[2] + other[2]

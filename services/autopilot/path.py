@@ -26,10 +26,11 @@ class BadPathError(ValueError):
 
 @dataclass(frozen=True)
 class PathState:
-    """One place on a path: position, unit tangent, yaw and its change a metre."""
+    """One place on a path: position, unit tangent, its change a metre, yaw and its change."""
 
     position_m: tuple[float, float, float]
     tangent: tuple[float, float, float]
+    curvature_1pm: tuple[float, float, float]
     yaw_rad: float
     yaw_rate_radpm: float
 
@@ -69,9 +70,8 @@ class Path:
         self._tangents = self._smooth_tangents()
         self.yaw_rates_radpm = self._smooth(np.diff(self._yaws_rad)[:, None] / self.spacing_m)[:, 0]
         """Change of the yaw a metre at the samples, (N,)."""
-        turning = self._smooth(np.diff(self._tangents, axis=0) / self.spacing_m)
-        self.curvature_1pm: Array = np.linalg.norm(turning, axis=1)
-        """Curvature at the samples, (N,)."""
+        self.curvatures_1pm = self._smooth(np.diff(self._tangents, axis=0) / self.spacing_m)
+        """Curvature vectors at the samples, towards the inside of the turn, (N, 3)."""
 
     @property
     def points_m(self) -> Array:
@@ -96,9 +96,11 @@ class Path:
         tangent = self._tangents[low] * (1.0 - share) + self._tangents[low + 1] * share
         norm = math.sqrt(float(tangent @ tangent)) or 1.0
         yaw = self._yaws_rad[low] * (1.0 - share) + self._yaws_rad[low + 1] * share
+        turning = self.curvatures_1pm[low] * (1.0 - share) + self.curvatures_1pm[low + 1] * share
         return PathState(
             (float(point[0]), float(point[1]), float(point[2])),
             (float(tangent[0]) / norm, float(tangent[1]) / norm, float(tangent[2]) / norm),
+            (float(turning[0]), float(turning[1]), float(turning[2])),
             float(yaw) + laps * self._yaw_turn_rad,
             float(self.yaw_rates_radpm[low]),
         )

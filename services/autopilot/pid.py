@@ -26,7 +26,12 @@ class Pid:
 
     def __init__(self, gains: Gains, axes: int) -> None:
         self._gains = gains
-        self._integral = [0.0] * axes
+        self._axes = axes
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget past errors."""
+        self._integral = [0.0] * self._axes
 
     def correction(
         self, error: Sequence[float], rate: Sequence[float], dt_s: float, saturated: bool

@@ -1,21 +1,57 @@
-"""How fast each plant's speeds follow the sticks: the lags that the follower leads by."""
+"""What the sticks do on each plant: the model that the controller turns round."""
 
 from dataclasses import dataclass
 
+from common.sticks import FULL_STICK
+
 
 @dataclass(frozen=True)
-class Lags:
-    """Mean delays of the speed behind the stick."""
+class Response:
+    """One axis: its speed v follows the stick u as dv/dt = rate (speed * u - v), u a little late.
 
-    plane_s: float
-    vertical_s: float
-    yaw_s: float
+    Attributes:
+        rate_ps: how fast, 1/s.
+        late_s: the mean delay of u on its way.
+        speed: steady speed per stick, m/s or rad/s.
+        limit: the stick beyond which nothing more happens; across the plane, of both axes together.
+    """
+
+    rate_ps: float
+    late_s: float
+    speed: float
+    limit: float = 1.0
+
+    @property
+    def top_speed(self) -> float:
+        """The steady speed at the limit, m/s or rad/s."""
+        return self.speed * self.limit
 
 
-LAGS: dict[str, Lags] = {
-    # tum_simulator a020d89: velocity loop 5 over attitude loop 10, 5: s3 + 5 s2 + 20 s + 50, so
-    # 20/50 s; climb 1/5 s; yaw rate 1/2 s.
-    "tum": Lags(0.4, 0.2, 0.5),
-    # tum_ardrone 6bcfb34, c1..c8: 1/0.58 + 1/7 s; 1/0.8 s; 1/90 s.
-    "ardrone": Lags(1.87, 1.25, 0.01),
+@dataclass(frozen=True)
+class Plant:
+    """The responses of the plane, upward, downward, and of the yaw."""
+
+    plane: Response
+    up: Response
+    down: Response
+    yaw: Response
+
+
+def _plant(name: str, plane: tuple[float, float], up_ps: float, yaw_ps: float) -> Plant:
+    full = FULL_STICK[name]
+    return Plant(
+        plane=Response(*plane, full.forward_mps / full.linear_to, full.linear_to),
+        up=Response(up_ps, 0.0, full.up_mps),
+        down=Response(up_ps, 0.0, full.down_mps),
+        yaw=Response(yaw_ps, 0.0, full.yaw_radps),
+    )
+
+
+PLANTS: dict[str, Plant] = {
+    # tum_simulator a020d89. Its speed loop 5, 1 over its tilt loop 10, 5 has the transfer function
+    # (25 s + 50) / (s3 + 10 s2 + 45 s + 50), whose inverse is 1 + 0.4 s to second order; 0.05 s is
+    # the filter of the tilt. Climb: 5 / (1 + 1); yaw: 2.
+    "tum": _plant("tum", (2.5, 0.05), 2.5, 2.0),
+    # tum_ardrone 6bcfb34: the speed follows the tilt with c1, the tilt the stick with c3; c7, c5.
+    "ardrone": _plant("ardrone", (0.58, 1.0 / 7.0), 0.8, 25.0),
 }

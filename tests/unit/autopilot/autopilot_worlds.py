@@ -40,9 +40,9 @@ def pose(
     )
 
 
-def vehicle(state: m.VehicleState, plant: m.Plant = "tum") -> m.VehicleStatus:
+def vehicle(state: m.VehicleState, plant: m.Plant = "tum", battery: float = 1.0) -> m.VehicleStatus:
     return m.VehicleStatus(
-        stamp=0, seq=0, state=state, battery=1.0, world="empty", plant=plant, collisions=0
+        stamp=0, seq=0, state=state, battery=battery, world="empty", plant=plant, collisions=0
     )
 
 
@@ -140,7 +140,7 @@ class LaggingVehicle:
             sin * vx + cos * vy + self.wind_mps[1],
             0.5 * vz,
         )
-        for axis, (goal, lag_s) in enumerate(zip(goals, (0.4, 0.4, 0.2), strict=True)):
+        for axis, (goal, lag_s) in enumerate(zip(goals, (0.4, 0.4, 0.4), strict=True)):
             self.velocity[axis] += dt_s * (goal - self.velocity[axis]) / lag_s
         self.yaw_rate += dt_s * (wz - self.yaw_rate) / 0.5
         self.x += dt_s * self.velocity[0]

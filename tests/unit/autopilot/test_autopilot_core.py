@@ -227,7 +227,7 @@ class TestLosses:
         rig.run(0.04)
         assert (rig.command.mode, rig.velocity_command) == ("engaged", NEUTRAL)
         rig.poses = True
-        rig.run(0.04)
+        rig.run(0.2)
         assert rig.command.mode == "engaged"
         assert rig.command.vx > 0.3
 
@@ -280,9 +280,184 @@ class TestLosses:
     def test_beyond_the_height_limits_it_is_given_up(self):
         rig = Rig(LaggingVehicle(z=1.0), Config(max_height_m=1.05))
         rig.engage(line())
-        rig.body.z = 1.2
+        rig.body.z = 1.6
         rig.run(0.04)
         assert (rig.command.mode, rig.status.reason) == ("hover", "geofence")
+
+    def test_beyond_the_fence_it_is_given_up(self):
+        rig = Rig(config=Config(fence_radius_m=3.0, leave_path_m=5.0))
+        rig.engage(line(2.9))
+        rig.body.y = 3.2
+        rig.run(0.04)
+        assert rig.command.mode == "engaged"
+        rig.body.y = -3.6
+        rig.run(0.04)
+        assert (rig.command.mode, rig.status.reason) == ("hover", "geofence")
+
+    def test_a_path_that_leaves_the_fence_refuses(self):
+        rig = Rig(config=Config(fence_radius_m=10.0))
+        rig.suggest(suggestion(line(11.0)))
+        assert rig.decide("accept").reason == "geofence"
+
+
+class TestHover:
+    def arrived(self, rig: Rig) -> None:
+        rig.engage(line(2.0))
+        rig.run(6.0)
+        assert (rig.command.mode, rig.status.reason) == ("hover", "finished")
+
+    def test_it_keeps_its_place_in_wind(self):
+        rig = Rig(LaggingVehicle(noise=1.0, wind_mps=(0.0, 0.3)))
+        self.arrived(rig)
+        place = (rig.body.x, rig.body.y, rig.body.z, rig.body.yaw)
+        rig.run(30.0)
+        assert (rig.body.x, rig.body.y, rig.body.z) == pytest.approx(place[:3], abs=0.1)
+        assert rig.body.yaw == pytest.approx(place[3], abs=0.1)
+        assert rig.velocity_command != NEUTRAL
+
+    def test_pushed_away_it_keeps_the_new_place(self, rig):
+        self.arrived(rig)
+        rig.run(2.0)
+        rig.body.y += 3.0
+        rig.run(5.0)
+        assert rig.body.y == pytest.approx(3.0, abs=0.2)
+
+    @pytest.mark.parametrize("what", ["sticks", "poses"])
+    def test_without_sticks_or_poses_it_is_neutral_and_holds_again_only_when_they_are_steady(
+        self, what
+    ):
+        rig = Rig(LaggingVehicle(wind_mps=(0.0, 0.3)))
+        self.arrived(rig)
+        rig.run(2.0)
+        assert rig.velocity_command != NEUTRAL
+        setattr(rig, what, False)
+        rig.run(0.24)
+        assert rig.velocity_command == NEUTRAL
+        setattr(rig, what, True)
+        rig.run(0.9)
+        assert rig.velocity_command == NEUTRAL
+        rig.run(0.5)
+        assert rig.velocity_command != NEUTRAL
+        assert rig.command.mode == "hover"
+
+    @pytest.mark.parametrize("state", ["taking_off", "landing", "landed"])
+    def test_only_what_flies_is_held(self, state):
+        rig = Rig(LaggingVehicle(wind_mps=(0.0, 0.3)))
+        rig.run(3.0)
+        assert rig.velocity_command != NEUTRAL
+        rig.autopilot.on_vehicle(vehicle(state), rig.now_ns)
+        rig.run(0.04)
+        assert rig.velocity_command == NEUTRAL
+
+    def test_the_change_from_path_to_place_is_smooth(self):
+        rig = Rig(LaggingVehicle(noise=0.0, wind_mps=(0.2, 0.3)))
+        rig.run(5.0)
+        rig.body.x = rig.body.y = 0.0
+        rig.run(0.1)
+        rig.engage(line(4.0))
+        before, largest = rig.velocity_command, 0.0
+        for _ in range(500):
+            rig.tick()
+            steps = [abs(a - b) for a, b in zip(rig.velocity_command, before, strict=True)]
+            largest, before = max(largest, *steps), rig.velocity_command
+        assert rig.status.reason == "finished"
+        assert largest <= 5.0 * 0.02 + 1e-9
+
+
+class TestBattery:
+    def charge(self, rig: Rig, battery: float, state: m.VehicleState = "flying") -> None:
+        rig.autopilot.on_vehicle(vehicle(state, battery=battery), rig.now_ns)
+
+    def test_a_low_one_refuses_to_begin_and_lets_go_on(self, rig):
+        rig.engage(line())
+        self.charge(rig, 0.2)
+        rig.run(1.0)
+        assert rig.command.mode == "engaged"
+        rig.suggest(suggestion(line(), id_=2))
+        assert rig.decide("accept", suggestion=2).reason == "battery_low"
+        assert "battery 20%" in rig.autopilot.health(rig.now_ns)[1]
+        self.charge(rig, 0.2, "landed")
+        assert rig.decide("takeoff").reason == "battery_low"
+
+    @pytest.mark.parametrize("engaged", [True, False])
+    def test_an_empty_one_lands(self, rig, engaged):
+        if engaged:
+            rig.engage(line())
+        self.charge(rig, 0.05)
+        rig.run(0.02)
+        assert (rig.command.mode, rig.command.action) == ("hover", "land")
+        assert rig.status.reason == "battery_empty"
+
+    def test_whoever_steers_chooses_where_it_comes_down(self, rig):
+        rig.deflect(vx=0.4)
+        self.charge(rig, 0.03)
+        rig.deflect(vx=0.5)
+        assert (rig.command.mode, rig.command.action, rig.command.vx) == ("manual", "fly", 0.5)
+        rig.deflect()
+        rig.run(0.02)
+        assert rig.command.action == "land"
+        rig.deflect(vx=0.5)
+        assert (rig.command.mode, rig.command.action, rig.command.vx) == ("manual", "fly", 0.5)
+
+
+class TestStuckPad:
+    def hold(self, rig: Rig, duration_s: float, tremor: float = 0.0) -> None:
+        rig.sticks = False
+        for tick in range(round(duration_s / 0.02)):
+            rig.tick()
+            rig.deflect(vx=0.5 + tremor * (tick % 2))
+
+    def test_it_is_told_then_it_counts_no_more(self, rig):
+        self.hold(rig, 10.5)
+        assert rig.command.vx == 0.5
+        state, detail = rig.autopilot.health(rig.now_ns)
+        assert state == "degraded"
+        assert "the sticks have not moved for 10 s" in detail
+        self.hold(rig, 10.0)
+        assert (rig.command.mode, rig.velocity_command) == ("hover", NEUTRAL)
+        assert rig.status.reason == "stick_stuck"
+        self.hold(rig, 5.2)
+        assert (rig.command.mode, rig.command.action) == ("hover", "land")
+
+    def test_it_counts_again_after_neutral(self, rig):
+        self.hold(rig, 21.0)
+        rig.deflect(vx=0.7)
+        assert rig.velocity_command == NEUTRAL
+        rig.deflect()
+        rig.deflect(vx=0.7)
+        assert (rig.command.mode, rig.command.vx) == ("manual", 0.7)
+
+    def test_a_hand_that_trembles_may_hold_for_ever(self, rig):
+        self.hold(rig, 60.0, tremor=0.004)
+        assert rig.command.mode == "manual"
+        assert rig.autopilot.health(rig.now_ns)[0] == "ok"
+
+
+def test_an_accepted_path_does_not_change_when_its_suggestion_does(rig):
+    rig.engage(line())
+    rig.run(1.0)
+    rig.suggest(suggestion(line(yaw=1.0)))
+    rig.run(3.0)
+    assert abs(rig.body.y) < 0.1
+    assert rig.status.cross_track < 0.1
+
+
+def test_the_newest_path_of_a_suggestion_is_accepted(rig):
+    rig.suggest(suggestion(line()))
+    rig.run(1.0)
+    rig.suggest(suggestion(line(yaw=1.0)))
+    rig.run(2.5)
+    assert rig.decide("accept", suggestion=1).ok
+    rig.run(4.0)
+    assert rig.body.y > 1.5
+
+
+def test_another_plant_ends_the_path(rig):
+    rig.engage(line())
+    rig.run(1.0)
+    rig.autopilot.on_vehicle(vehicle("flying", plant="ardrone"), rig.now_ns)
+    rig.run(0.02)
+    assert (rig.command.mode, rig.status.reason) == ("hover", "vehicle_changed")
 
 
 class TestTakeoffLandEmergency:
