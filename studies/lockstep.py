@@ -119,6 +119,7 @@ class Lockstep:
             self.listen("truth", self._truth_is_the_pose)
         if classifier is not None:
             self.listen("stick", classifier.on_stick)
+            self.listen("vehicle", classifier.on_vehicle)
         if synthesizer is not None:
             self._wire_synthesizer(synthesizer)
         if autopilot is not None:
