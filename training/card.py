@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from training.generator.dataset import counts_of
-from training.generator.operators import FAMILIES
+from training.generator.people import FAMILIES
 from training.labels import PRIMITIVES
 
 if TYPE_CHECKING:

@@ -1,58 +1,59 @@
-"""Sets of labelled sticks: operators of many families, each performing all four primitives."""
+"""Sets of labelled sticks by simulated people: the wide population, and the thesis' own."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from training.dataset.primitive import Primitive
-from training.generator.hands import STEP_S, hand
-from training.generator.operators import FAMILIES, Family, Operator, Style, draw_operator
-from training.generator.pilots import pilot
-from training.generator.shapes import Array, hand_plan, path_plan
+from training.generator import hands, nothing, observer, pilots
+from training.generator.noise import STEP_S, Array
+from training.generator.pad import read
+from training.generator.people import FAMILIES, THESIS_FAMILIES, Family, People, Style, draw_people
+from training.generator.shapes import COMPASS_SHARE, ask
+from training.labels import NONE, PRIMITIVES
 
 THESIS_COUNTS = {"line": 597, "arc": 716, "sine": 617, "helix": 469}
 """The thesis' 2399 primitives."""
-PILOT_DURATIONS_S = {"line": (1.5, 7.0), "arc": (2.0, 8.0), "sine": (4.0, 8.5), "helix": (2.5, 8.5)}
 SHORTEST_S, LONGEST_SAMPLES = 1.0, 400
 """The thesis drops what is shorter than a second or longer than 400 samples."""
+CHUNK = 256
+TRIES_AT_ONCE = 48
+MOST_ROUNDS = 100
+NONE_S = (1.2, 8.5)
+
+IntArray = NDArray[np.int64]
+Messages = tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class Population:
+    """Where people are from.
+
+    Attributes:
+        name: in the source of their primitives.
+        families: kinds of people, in turn.
+        difficulty: how far people are from the textbook: scales habits of bad execution and the
+            scatter of shapes.
+        compass_share: those who set out in one of eight directions.
+    """
+
+    name: str
+    families: tuple[Family, ...]
+    difficulty: float = 1.0
+    compass_share: float = COMPASS_SHARE
+
+
+THESIS_DIFFICULTY = 1.6
+"""Found by `training.generator.calibration`."""
+THESIS = Population("thesis", THESIS_FAMILIES, THESIS_DIFFICULTY, compass_share=0.85)
+"""The calibrated population: on its sticks the thesis' machine scores as in the thesis."""
 
 
 def counts_of(multiple: float) -> dict[str, int]:
     """The thesis' counts by label, times `multiple`."""
     return {label: max(1, round(count * multiple)) for label, count in THESIS_COUNTS.items()}
-
-
-def perform(
-    label: str, family: Family, who: Operator, name: str, source: str, rng: np.random.Generator
-) -> Primitive:
-    """One primitive by one person, sampled as a pad is: irregular times, lost samples."""
-    while True:
-        if family.style is Style.HAND:
-            sticks = hand(hand_plan(label, rng, STEP_S), who, rng)
-        else:
-            duration_s = float(rng.uniform(*PILOT_DURATIONS_S[label]))
-            sticks = pilot(path_plan(label, rng), who, family.style, duration_s, rng)
-        times_s, sticks = _sampled(sticks, who, rng)
-        if times_s[-1] >= SHORTEST_S and len(times_s) <= LONGEST_SAMPLES:
-            return Primitive(times_s, sticks, label, name, family.name, source)
-
-
-def _sampled(sticks: Array, who: Operator, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Sticks at `STEP_S` read at a pad's own irregular times."""
-    # Before the first deflection nothing is being performed.
-    moving = np.flatnonzero(np.abs(sticks).max(axis=1) > 0.05)
-    sticks = sticks[moving[0] if len(moving) else 0 :]
-    duration_s = (len(sticks) - 1) * STEP_S
-    count = int(duration_s * who.rate_hz) + 2
-    steps = np.clip(1.0 + who.jitter * rng.standard_normal(count), 0.3, 2.5) / who.rate_hz
-    times_s = np.concatenate([[0.0], np.cumsum(steps)])
-    times_s = times_s[times_s <= duration_s]
-    kept = rng.random(len(times_s)) >= who.loss
-    kept[0] = True
-    times_s = times_s[kept]
-    grid_s = np.arange(len(sticks)) * STEP_S
-    read = np.stack([np.interp(times_s, grid_s, sticks[:, k]) for k in range(4)], axis=1)
-    return times_s, read
 
 
 def generate(
@@ -62,29 +63,142 @@ def generate(
     families: tuple[Family, ...] = FAMILIES,
     progress: Callable[[int], None] = lambda _: None,
 ) -> list[Primitive]:
-    """A set by `operators` people, families in turn, primitives dealt to them evenly.
+    """A set by `operators` people of the wide population, primitives dealt to them evenly.
 
     Args:
         operators: how many people.
-        counts: primitives by label.
+        counts: performances by label; `none` is one of them.
         seed: the same seed gives the same set.
         families: kinds of people.
-        progress: told how many more primitives there are, now and then.
+        progress: told how many more there are, now and then.
+
+    Raises:
+        ValueError: on an unknown label, or without operators or families.
     """
+    return populate(Population("wide", families), operators, counts, seed, progress)
+
+
+def populate(
+    population: Population,
+    operators: int,
+    counts: dict[str, int],
+    seed: int,
+    progress: Callable[[int], None] = lambda _: None,
+) -> list[Primitive]:
+    """A set by people of a population; see `generate`."""
+    unknown = [label for label in counts if label not in (*PRIMITIVES, NONE)]
+    if unknown:
+        raise ValueError(f"label {unknown[0]!r} is unknown; use {', '.join((*PRIMITIVES, NONE))}")
+    if operators < 1 or not population.families:
+        raise ValueError("a set needs at least one operator and one family")
     sequence = np.random.SeedSequence(seed)
-    people = []
-    for number, child in enumerate(sequence.spawn(operators)):
-        family = families[number % len(families)]
-        people.append((family, draw_operator(family, np.random.default_rng(child))))
-    primitives: list[Primitive] = []
-    streams = sequence.spawn(sum(counts.values()))
+    members = [population.families[k % len(population.families)] for k in range(operators)]
+    people = draw_people(members, np.random.default_rng(sequence.spawn(1)[0]))
+    people = people.worse(population.difficulty)
+    styles = np.array([family.style.value for family in members])
+    source = f"generator {population.name} seed {seed}"
+    made: list[Primitive] = []
     for label, count in counts.items():
-        for turn in range(count):
-            number = turn % operators
-            family, who = people[number]
-            rng = np.random.default_rng(streams[len(primitives)])
-            name = f"{family.name}-{number:04d}"
-            primitives.append(perform(label, family, who, name, f"generator wide seed {seed}", rng))
-            if turn % 20 == 19:
-                progress(20)
-    return primitives
+        who = np.arange(count) % operators
+        messages: list[Messages | None] = [None] * count
+        for style in Style:
+            places = np.flatnonzero(styles[who] == style.value)
+            for begin in range(0, len(places), CHUNK):
+                chunk = places[begin : begin + CHUNK]
+                rng = np.random.default_rng(sequence.spawn(1)[0])
+                performers = people.take(who[chunk])
+                done = perform(label, style, performers, population, rng)
+                for place, performed in zip(chunk, done, strict=True):
+                    messages[place] = performed
+                progress(len(chunk))
+        for number, one in zip(who, messages, strict=True):
+            assert one is not None  # every place is in the chunk of its style
+            family = members[number].name
+            name = f"{family}-{number:04d}"
+            made.append(Primitive(one[0], one[1], label, name, family, source))
+    return made
+
+
+def perform(
+    label: str, style: Style, people: People, population: Population, rng: np.random.Generator
+) -> list[Messages]:
+    """Messages of each of these people for one performance, done again until it is one.
+
+    Raises:
+        RuntimeError: if somebody never manages to.
+    """
+    done: list[Messages | None] = [None] * len(people)
+    pending = np.arange(len(people))
+    for _ in range(MOST_ROUNDS):
+        # Few people waste a loop over time, so the last ones try several times at once.
+        again = max(1, TRIES_AT_ONCE // len(pending))
+        tries = np.repeat(pending, again)
+        messages, good = attempt(label, style, people.take(tries), population, rng)
+        for place, one, is_good in zip(tries, messages, good, strict=True):
+            if is_good and done[place] is None:
+                done[place] = one
+        pending = np.array([k for k, one in enumerate(done) if one is None], dtype=np.int64)
+        if len(pending) == 0:
+            return [one for one in done if one is not None]
+    raise RuntimeError(f"{len(pending)} of {len(people)} people cannot fly a {label}")
+
+
+def attempt(
+    label: str, style: Style, people: People, population: Population, rng: np.random.Generator
+) -> tuple[list[Messages], NDArray[np.bool_]]:
+    """One try of each of these people, and whether an observer and the thesis' filters take it."""
+    if label == NONE:
+        sticks, samples, good = _nothing(people, rng)
+    else:
+        shapes = ask(label, people, style, rng, population.difficulty, population.compass_share)
+        if style is Style.HAND:
+            sticks, samples = hands.draw(shapes, people, rng)
+            where_m = observer.flown_m(hands.alive(sticks, people.dead_band[:, None, None]))
+        else:
+            sticks, samples, where_m = pilots.fly(shapes, people, rng)
+        path_m = observer.seen(where_m, samples)
+        good = observer.looks_like(label, path_m, shapes.vertical, shapes.plane_rad)
+    messages = read(sticks, samples, people, rng, begun=label != NONE)
+    fits = [t[-1] >= SHORTEST_S and len(t) <= LONGEST_SAMPLES for t, _ in messages]
+    return messages, good & np.array(fits)
+
+
+def _nothing(people: People, rng: np.random.Generator) -> tuple[Array, IntArray, NDArray[np.bool_]]:
+    """Sticks without a primitive in them, samples of each, and whether an observer agrees."""
+    n = len(people)
+    duration_s = np.clip(3.6 * np.exp(0.5 * rng.standard_normal(n)), *NONE_S)
+    samples = np.round(duration_s / STEP_S).astype(np.int64)
+    count = int(samples.max())
+    sticks = np.zeros((n, count, 4))
+    kinds = rng.choice(len(nothing.KINDS), n, p=list(nothing.KINDS.values()))
+    for kind, act in enumerate((nothing.rest, nothing.turn, nothing.hover, nothing.free)):
+        rows = np.flatnonzero(kinds == kind)
+        if len(rows):
+            sticks[rows] = act(people.take(rows), count, rng)
+    good = np.ones(n, dtype=bool)
+    free = np.flatnonzero(kinds == list(nothing.KINDS).index("free"))
+    if len(free):
+        dead_band = people.dead_band[free, None, None]
+        where_m = observer.flown_m(hands.alive(sticks[free], dead_band))
+        path_m = observer.seen(where_m, samples[free])
+        level, ahead = np.zeros(len(free), dtype=bool), np.zeros(len(free))
+        for label in PRIMITIVES:
+            good[free] &= ~observer.looks_like(label, path_m, level, ahead)
+    return sticks, samples, good
+
+
+def hovering(
+    operators: int, seconds: float, seed: int, families: Sequence[Family] = FAMILIES
+) -> list[Primitive]:
+    """Hover corrections without a pause, `seconds` of each of `operators` people."""
+    members = [families[k % len(families)] for k in range(operators)]
+    rng = np.random.default_rng(seed)
+    people = draw_people(members, rng)
+    count = round(seconds / STEP_S) + 1
+    sticks = nothing.hover(people, count, rng)
+    messages = read(sticks, np.full(operators, count), people, rng, begun=False)
+    source = f"generator hover seed {seed}"
+    return [
+        Primitive(times_s, read_, NONE, f"{family.name}-{number:04d}", family.name, source)
+        for number, (family, (times_s, read_)) in enumerate(zip(members, messages, strict=True))
+    ]

@@ -1,125 +1,170 @@
-"""From a meant velocity to sticks: what an arm, a thumb and a pad make of it."""
+"""Hands: from a meant push to what thumbs make of it and a pad sends. Rows are performances."""
 
 import math
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
-from scipy.signal import lfilter
+from numpy.typing import NDArray
 
-from training.generator.operators import Operator
-from training.generator.shapes import Array
+from training.generator.noise import STEP_S, Array, pulses, slow, tremor, wander
+from training.generator.people import People
+from training.generator.shapes import Shapes
 
-STEP_S = 0.02
-TREMOR_HZ = 9.0
-
-
-def slow_noise(count: int, time_constant_s: float, rng: np.random.Generator) -> Array:
-    """(count,) coloured noise of standard deviation 1 over its own length, at `STEP_S`."""
-    sigma = time_constant_s / STEP_S
-    pad = int(4 * sigma) + 1
-    white = rng.standard_normal(count + 2 * pad)
-    smooth = gaussian_filter1d(white, sigma)[pad : pad + count]
-    return np.asarray(smooth * math.sqrt(2.0 * math.sqrt(math.pi) * sigma))
+FULL_UP_MPS = 0.5
+FULL_YAW_RADPS = 1.0
+"""Full stick of the tum plant; it also is 1 m/s forward and sideways."""
+LEAD_OUT_SHARE = 0.6
+"""Those who let go of the stick before they press the stop button."""
+YAW_ALSO_SHARE = 0.3
 
 
-def lagged(values: Array, time_constant_s: float) -> Array:
-    """Values (N, k) after a first-order lag, from rest."""
-    keep = math.exp(-STEP_S / max(time_constant_s, 1e-3))
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, axis=0))
-
-
-def tremor(count: int, who: Operator, rng: np.random.Generator) -> Array:
-    """(count,) tremor about `TREMOR_HZ` with a wandering amplitude."""
-    phase = 2.0 * math.pi * TREMOR_HZ * STEP_S * np.arange(count) + 0.8 * slow_noise(
-        count, 0.1, rng
-    )
-    strength = 0.6 + 0.4 * slow_noise(count, 0.3, rng)
-    white = 0.4 * rng.standard_normal(count)
-    return who.tremor * (strength * np.sin(phase + rng.uniform(0, 6.3)) + white)
-
-
-def on_pad(sticks: Array, who: Operator) -> Array:
-    """Sticks (N, k) as the pad sends them: dead band, clipped to full stick."""
-    return np.clip(np.where(np.abs(sticks) < who.dead_band, 0.0, sticks), -1.0, 1.0)
-
-
-def towards_axes(vx: Array, vy: Array, pull: float) -> tuple[Array, Array]:
-    """Directions drawn towards the nearest axis by a share of their distance to it."""
+def towards_axes(vx: Array, vy: Array, pull: Array) -> tuple[Array, Array]:
+    """Pushes drawn towards the nearest axis by a share of their angle to it."""
     angle = np.arctan2(vy, vx)
     nearest = np.round(angle / (math.pi / 2)) * (math.pi / 2)
     # Weakest half-way between two axes, where neither is near.
-    strength = pull * np.cos(2.0 * (angle - nearest))
-    drawn = angle + strength * (nearest - angle)
+    drawn = angle + pull * np.cos(2.0 * (angle - nearest)) * (nearest - angle)
     level = np.hypot(vx, vy)
     return level * np.cos(drawn), level * np.sin(drawn)
 
 
-def height_pulses(count: int, who: Operator, rng: np.random.Generator) -> Array:
-    """(count,) single corrections of the height, as shares of the vertical stick."""
-    pulses = np.zeros(count)
-    for _ in range(rng.poisson(who.height_hz * count * STEP_S)):
-        # Often at the beginning, when the eyes are free for it.
-        begin = int(rng.integers(0, count)) if rng.random() < 0.7 else int(rng.integers(0, 25))
-        end = begin + int(rng.uniform(0.15, 0.9) / STEP_S)
-        pulses[begin:end] += rng.choice((-1.0, 1.0)) * rng.uniform(0.1, 0.5)
-    return pulses
+def stepped(vx: Array, vy: Array, steps: Array) -> tuple[Array, Array]:
+    """Pushes drawn towards the nearest of eight directions, with more than half a push full."""
+    angle, level = np.arctan2(vy, vx), np.hypot(vx, vy)
+    eighth = np.round(angle / (math.pi / 4)) * (math.pi / 4)
+    angle = angle + steps * (eighth - angle)
+    level = level + steps * 0.5 * (np.where(level > 0.3, 1.0, 0.0) - level)
+    return level * np.cos(angle), level * np.sin(angle)
 
 
-def _warped(plan: Array, who: Operator, rng: np.random.Generator) -> Array:
-    """The plan (N, 3) run through unevenly, with stops."""
-    count = len(plan)
-    pace = np.clip(1.0 + who.warp * slow_noise(count, 0.5, rng), 0.3, 2.0)
-    for _ in range(rng.poisson(who.hesitation_hz * count * STEP_S)):
-        begin = int(rng.integers(0, count))
-        pace[begin : begin + int(rng.uniform(0.1, 0.4) / STEP_S)] = 0.0
-    phase = np.cumsum(pace)
-    phase *= (count - 1) / max(float(phase[-1]), 1.0)
-    index = np.arange(count)
-    return np.stack([np.interp(phase, index, plan[:, k]) for k in range(3)], axis=1)
+def taps(people: People, count: int, rng: np.random.Generator) -> Array:
+    """(n, count) 1 while pushing, 0 between taps."""
+    phase = np.arange(count) * STEP_S / people.tap_s[:, None] + rng.random((len(people), 1))
+    return np.where(phase % 1.0 < 1.0 - people.tap[:, None], 1.0, 0.0)
 
 
-def _corrected(angle: Array, who: Operator, rng: np.random.Generator) -> Array:
-    """Directions (N,) with slow wander and short corrections."""
-    count = len(angle)
-    angle = angle + who.wander_rad * slow_noise(count, 0.6, rng)
-    for _ in range(rng.poisson(who.correction_hz * count * STEP_S)):
-        begin = int(rng.integers(0, count))
-        end = begin + int(rng.uniform(0.1, 0.35) / STEP_S)
-        angle[begin:end] += rng.normal(0.0, 0.25)
-    return angle
+def neuromuscular(wanted: Array, people: People) -> Array:
+    """Sticks (n, k, 4) after the two lags of arm and thumb, from neutral."""
+    keep = np.exp(-STEP_S / people.lag_s)[:, None]
+    out = np.empty_like(wanted)
+    first = np.zeros((len(people), 4))
+    second = np.zeros((len(people), 4))
+    for i in range(wanted.shape[1]):
+        first = keep * first + (1.0 - keep) * wanted[:, i]
+        second = keep * second + (1.0 - keep) * first
+        out[:, i] = second
+    return out
 
 
-def hand(plan: Array, who: Operator, rng: np.random.Generator) -> Array:
-    """Sticks (N, 4) at `STEP_S` of a hand that performs a plan (M, 3) without watching."""
-    meant = _warped(plan, who, rng)
-    count = len(meant)
-    level = np.hypot(meant[:, 0], meant[:, 1])
-    angle = _corrected(np.unwrap(np.arctan2(meant[:, 1], meant[:, 0])), who, rng)
-    if who.steps > 0.0:
-        stepped = np.round(angle / (math.pi / 4)) * (math.pi / 4)
-        angle = angle + who.steps * (stepped - angle)
-    ramp_in = np.clip(np.arange(count) * STEP_S / who.ramp_s, 0.0, 1.0)
-    fade = 1.0 + rng.normal(0.0, who.drift) * np.linspace(0.0, 1.0, count)
-    dips = np.clip(1.0 + who.signal_noise * slow_noise(count, 0.25, rng), 0.2, 1.6)
-    envelope = ramp_in * np.clip(fade, 0.4, 1.6) * dips
-    vx, vy = level * envelope * np.cos(angle), level * envelope * np.sin(angle)
-    ratio = math.exp(rng.normal(0.0, who.imbalance))
-    vx, vy = towards_axes(vx * math.sqrt(ratio), vy / math.sqrt(ratio), who.axis_pull)
-    up_noise = 1.0 + 1.5 * who.signal_noise * slow_noise(count, 0.3, rng)
-    vz = meant[:, 2] * envelope * up_noise + who.cross_talk * vx * slow_noise(count, 0.5, rng)
-    if rng.random() < 0.5:
-        # The other thumb is often later.
-        late = int(rng.uniform(0.0, 0.4) / STEP_S)
-        vz = np.concatenate([np.zeros(late), vz])[:count]
-    if level.any():
-        vz = vz + height_pulses(count, who, rng)
-    sticks = np.stack([vx, vy, vz, np.zeros(count)], axis=1)
-    if rng.random() < 0.6:
-        out = int(rng.uniform(0.04, who.ramp_s) / STEP_S)
-        tail = sticks[-1] * np.linspace(1.0, 0.1, out)[:, None]
-        sticks = np.concatenate([sticks, tail])
-    sticks = lagged(lagged(sticks, who.lag_s), who.lag_s)
-    active = np.abs(sticks).max(axis=0) > 0.05
-    for axis in np.flatnonzero(active):
-        sticks[:, axis] += tremor(len(sticks), who, rng)
-    return on_pad(sticks, who)
+def held(wanted: Array, people: People) -> Array:
+    """Sticks (n, k, 4) of thumbs that stay until they should be elsewhere by more than `hold`."""
+    out = np.empty_like(wanted)
+    now = np.zeros((len(people), 4))
+    hold = people.hold[:, None]
+    for i in range(wanted.shape[1]):
+        now = np.where(
+            (np.abs(wanted[:, i] - now) > hold) | (wanted[:, i] == 0.0), wanted[:, i], now
+        )
+        out[:, i] = now
+    return out
+
+
+def shaken(sticks: Array, people: People, rng: np.random.Generator) -> Array:
+    """Sticks (n, k, 4) with tremor on the axes in use, and noise in proportion to the push."""
+    n, count = sticks.shape[:2]
+    used = np.abs(sticks).max(axis=1) > 0.05
+    shaken = sticks.copy()
+    for axis in range(4):
+        noise = people.signal_noise[:, None] * slow(n, count, 0.12, rng)
+        shake = tremor(people.tremor_hz, count, rng) * people.tremor[:, None] / 0.87
+        shaken[:, :, axis] *= 1.0 + noise
+        shaken[:, :, axis] += np.where(used[:, axis, None], shake, 0.0)
+    return shaken
+
+
+def alive(sticks: Array, dead_band: Array) -> Array:
+    """Sticks without those within the dead band."""
+    return np.where(np.abs(sticks) < dead_band, 0.0, sticks)
+
+
+def paced(people: People, samples: NDArray[np.int64], rng: np.random.Generator) -> Array:
+    """Progress (n, k) from 0 to 1 at `samples` (n,), at an uneven pace with stops."""
+    n, count = len(people), int(samples.max())
+    pace = np.clip(1.0 + people.warp[:, None] * wander(n, count, rng), 0.2, 2.2)
+    stops = pulses(people.hesitation_hz, count, (0.1, 0.5), 1.0, rng)
+    phase = np.cumsum(np.where(stops != 0.0, 0.0, pace), axis=1)
+    end = phase[np.arange(n), samples - 1]
+    return np.asarray(phase / np.maximum(end, 1.0)[:, None])
+
+
+def draw(
+    shapes: Shapes, people: People, rng: np.random.Generator
+) -> tuple[Array, NDArray[np.int64]]:
+    """Sticks of hands that perform shapes without watching the vehicle.
+
+    Returns:
+        (n, k, 4) at `STEP_S` and how many of the k samples belong to each performance.
+    """
+    n = len(people)
+    samples = np.round(shapes.duration_s / STEP_S).astype(np.int64)
+    progress = np.minimum(paced(people, samples, rng), 1.0)
+    count = progress.shape[1]
+    time_s = np.arange(count) * STEP_S
+    meant = shapes.direction(progress)
+    astray = people.wander_rad[:, None] * wander(n, count, rng)
+    astray += pulses(people.correction_hz, count, (0.1, 0.35), 0.35, rng)
+
+    flat = ~shapes.vertical[:, None]
+    by_yaw = np.where(shapes.vertical, 0.0, people.yaw)[:, None]
+    turning = np.diff(meant, axis=1, prepend=meant[:, :1]) / STEP_S / FULL_YAW_RADPS
+    turn = by_yaw * turning + np.where(by_yaw > 0.0, astray * 0.8, 0.0)
+    angle = meant - by_yaw * (meant - meant[:, :1]) + np.where(by_yaw > 0.5, 0.3, 1.0) * astray
+
+    ramp = np.clip(time_s / people.ramp_s[:, None], 0.0, 1.0)
+    fade = 1.0 + people.drift[:, None] * rng.standard_normal((n, 1)) * progress
+    push = people.push * np.exp(0.2 * rng.standard_normal(n))
+    level = push[:, None] * shapes.speed(progress) * ramp * np.clip(fade, 0.4, 1.6)
+    plane = shapes.plane_rad[:, None]
+    along, across = level * np.cos(angle), level * np.sin(angle)
+    vx = np.where(flat, along, along * np.cos(plane))
+    vy = np.where(flat, across, along * np.sin(plane))
+    ratio = np.exp(0.5 * people.imbalance * rng.standard_normal(n))[:, None]
+    vx, vy = towards_axes(vx * ratio, vy / ratio, people.axis_pull[:, None])
+    vx, vy = stepped(vx, vy, people.steps[:, None])
+
+    climb = np.where(flat, shapes.climb[:, None] * level, across)
+    late = time_s >= (people.late_s * rng.random(n))[:, None]
+    climb = np.where(late, climb, 0.0) * (1.0 + 0.15 * wander(n, count, rng))
+    climb += people.cross_talk[:, None] * vx * slow(n, count, 0.5, rng)
+    climb += pulses(people.height_hz, count, (0.15, 0.7), 0.25, rng)
+    leak = people.cross_talk * (rng.random(n) < YAW_ALSO_SHARE)
+    turn = turn + leak[:, None] * vy * slow(n, count, 0.5, rng)
+
+    wanted = np.stack([vx, vy, climb, turn], axis=2) * taps(people, count, rng)[:, :, None]
+    released = released_at(samples, people, rng)
+    wanted, samples = lead_out(wanted, samples, released, people)
+    return shaken(neuromuscular(held(wanted, people), people), people, rng), samples
+
+
+def released_at(
+    samples: NDArray[np.int64], people: People, rng: np.random.Generator
+) -> NDArray[np.int64]:
+    """How many samples (n,) of letting go each performance has before the stop button."""
+    out_s = rng.uniform(0.04, 1.0, len(people)) * people.ramp_s
+    some = rng.random(len(people)) < LEAD_OUT_SHARE
+    return np.where(some, np.round(out_s / STEP_S), 0).astype(np.int64)
+
+
+def lead_out(
+    wanted: Array,
+    samples: NDArray[np.int64],
+    released: NDArray[np.int64],
+    people: People,
+) -> tuple[Array, NDArray[np.int64]]:
+    """Pushes (n, k, 4) that fade to neutral after their last sample, and their new lengths."""
+    n = len(people)
+    total = samples + released
+    index = np.arange(int(total.max()))
+    source = np.minimum(index[None], samples[:, None] - 1)
+    after = np.maximum(index[None] - (samples[:, None] - 1), 0)
+    fade = np.clip(1.0 - after / np.maximum(released, 1)[:, None], 0.0, 1.0)
+    return wanted[np.arange(n)[:, None], source] * fade[:, :, None], total

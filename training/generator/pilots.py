@@ -1,103 +1,176 @@
-"""Pilots who watch the vehicle and steer it along a path, by yaw or by strafing."""
+"""Pilots, who watch a moving vehicle and steer it along a path, by yaw, by strafing, or by both.
+
+One loop over time steps many performances at once (rows).
+"""
 
 import math
-from collections import deque
 
 import numpy as np
+from numpy.typing import NDArray
 
-from training.generator.hands import STEP_S, height_pulses, on_pad, slow_noise, towards_axes, tremor
-from training.generator.operators import Operator, Style
-from training.generator.shapes import PATH_STEP_M, Array, PathPlan
+from training.generator.hands import (
+    FULL_UP_MPS,
+    FULL_YAW_RADPS,
+    alive,
+    shaken,
+    stepped,
+    taps,
+    towards_axes,
+)
+from training.generator.noise import STEP_S, Array, pulses, slow, wander
+from training.generator.people import People
+from training.generator.shapes import Shapes
 
-VELOCITY_LAG_S = 0.4
-"""Of the simulated vehicle from stick to speed."""
-FULL_UP_MPS = 0.5
-FULL_YAW_RADPS = 1.0
-PLANT_NOISE = 0.03
-"""Drift of the vehicle's speed, redrawn slowly (tum_simulator's command drift), in m/s."""
-HEIGHT_GAIN = 0.7
+POINTS = 240
+BEYOND = 1.35
+"""A path goes on in a pilot's mind: progress up to which it is known."""
+SLOWEST_TURN = 0.25
+"""Share of the push that remains while the nose points elsewhere."""
+HEIGHT_GAIN = 0.8
+"""Speed per error in height, 1/s (chosen)."""
+HEIGHT_SEEN_M = 0.06
+"""Smaller errors in height are let be."""
+LONGEST_S = 8.6
+PRESS_S = (0.0, 0.35)
+"""From the end of the path to the stop button."""
 
 
-def pilot(
-    plan: PathPlan, who: Operator, style: Style, duration_s: float, rng: np.random.Generator
-) -> Array:
-    """Sticks (N, 4) at `STEP_S` of a pilot who flies a plan and corrects what is seen.
+def path_m(shapes: Shapes, people: People, push: Array) -> Array:
+    """Points (n, POINTS, 3) of the path meant, from the origin."""
+    progress = np.linspace(0.0, BEYOND, POINTS)[None].repeat(len(people), axis=0)
+    direction = shapes.direction(progress)
+    step_m = (push * shapes.duration_s * BEYOND / (POINTS - 1))[:, None] * shapes.speed(progress)
+    along, across = step_m * np.cos(direction), step_m * np.sin(direction)
+    plane = shapes.plane_rad[:, None]
+    # Straight up and down a vehicle is slower; the shape is drawn as large as it can fly.
+    across = np.where(shapes.vertical[:, None], across * FULL_UP_MPS, across)
+    x = np.where(shapes.vertical[:, None], along * np.cos(plane), along)
+    y = np.where(shapes.vertical[:, None], along * np.sin(plane), across)
+    z = np.where(shapes.vertical[:, None], across, FULL_UP_MPS * shapes.climb[:, None] * step_m)
+    steps = np.stack([x, y, z], axis=2)
+    return np.asarray(np.cumsum(steps, axis=1) - steps[:, :1])
 
-    Full stick is 1 m/s, 0.5 m/s up and 1 rad/s, as of the `tum` plant.
+
+def fly(
+    shapes: Shapes, people: People, rng: np.random.Generator
+) -> tuple[Array, NDArray[np.int64], Array]:
+    """Sticks of pilots who steer the tum plant along shapes and correct what they see.
+
+    Returns:
+        (n, k, 4) at `STEP_S`, how many of the k samples belong to each performance, and where
+        (n, k, 3) the vehicle was, in m.
     """
-    count = int(duration_s / STEP_S)
-    heading = rng.uniform(-math.pi, math.pi) if style is Style.STRAFE else rng.normal(0.0, 0.12)
-    x, y, z = 0.0, 0.0, 0.0
-    v_x, v_y, v_z = 0.0, 0.0, 0.0
-    drift = PLANT_NOISE * np.stack([slow_noise(count, 1.0, rng) for _ in range(3)], axis=1)
-    level = plan.speed_mps * np.clip(
-        1.0
-        + rng.normal(0.0, who.drift) * np.linspace(0.0, 1.0, count)
-        + who.signal_noise * slow_noise(count, 0.5, rng),
-        0.4,
-        1.6,
+    n, count = len(people), int(LONGEST_S / STEP_S)
+    rows = np.arange(n)
+    push = np.clip(people.push * np.exp(0.2 * rng.standard_normal(n)), 0.15, 1.1)
+    points = path_m(shapes, people, push)
+    end = int(np.searchsorted(np.linspace(0.0, BEYOND, POINTS), 1.0))
+    spacing = np.linalg.norm(np.diff(points, axis=1), axis=2).mean(axis=1)
+    ahead = np.clip(
+        np.round(people.lookahead_s * push / np.maximum(spacing, 1e-3)), 2, POINTS // 3
+    ).astype(np.int64)
+
+    # The path is drawn in the frame of the vehicle's first heading.
+    heading = np.where(people.yaw > 0.5, 0.12 * rng.standard_normal(n), 0.0)
+    tail_first = np.where((people.yaw > 0.5) & (np.cos(shapes.plane_rad) < -0.5), -1.0, 1.0)
+    fade = 1.0 + people.drift[:, None] * rng.standard_normal((n, 1)) * np.linspace(0, 1, count)
+    level = push[:, None] * np.clip(
+        fade * (1.0 + 0.5 * people.warp[:, None] * wander(n, count, rng)), 0.3, 1.6
     )
-    wander = who.wander_rad * slow_noise(count, 0.8, rng)
-    pulses = height_pulses(count, who, rng)
-    keep_v = math.exp(-STEP_S / VELOCITY_LAG_S)
-    keep_hand = math.exp(-STEP_S / max(who.lag_s, 1e-3))
-    every = max(1, round(who.decide_s / STEP_S))
-    ahead = max(2, round(who.lookahead_s * plan.speed_mps / PATH_STEP_M))
-    late: deque[tuple[float, float, float]] = deque()
-    delay = round(who.reaction_s / STEP_S)
-    points = plan.points_m
-    nearest, last = 0, len(points) - 1
-    aim = (0.0, 0.0, 0.0)
-    # Where a person aims before seeing any effect: along the path's first metres.
-    first = points[min(ahead, last)]
-    bearing = math.atan2(first[1], first[0]) - heading
-    begun = (math.cos(bearing), math.sin(bearing), 0.0)
-    first_stick = begun if style is Style.STRAFE else (1.0, 0.0, 0.0)
-    held = [0.0, 0.0, 0.0, 0.0]
-    hand = [0.0, 0.0, 0.0, 0.0]
-    slow = [0.0, 0.0, 0.0, 0.0]
-    out = np.empty((count, 4))
+    stops = pulses(people.hesitation_hz, count, (0.1, 0.5), 1.0, rng)
+    level = np.where(stops != 0.0, 0.2, level) * np.clip(
+        np.arange(count) * STEP_S / people.ramp_s[:, None], 0.0, 1.0
+    )
+    astray = people.wander_rad[:, None] * wander(n, count, rng)
+    astray += pulses(people.correction_hz, count, (0.1, 0.35), 0.3, rng)
+    height = pulses(people.height_hz, count, (0.15, 0.7), 0.25, rng)
+    # Who taps pushes harder, to get on.
+    gate = taps(people, count, rng) / (1.0 - 0.7 * people.tap[:, None])
+    air = people.wind_mps[:, None, None] * np.stack([slow(n, count, 1.0, rng) for _ in range(3)], 2)
+    noise = 1.0 + people.signal_noise[:, None, None] * np.stack(
+        [slow(n, count, 0.12, rng) for _ in range(4)], 2
+    )
+
+    keep_vehicle = np.exp(-STEP_S / people.vehicle_s)[:, None]
+    keep_hand = np.exp(-STEP_S / people.lag_s)[:, None]
+    delay = np.round(people.reaction_s / STEP_S).astype(np.int64)
+    decide = np.maximum(1, np.round(people.decide_s / STEP_S)).astype(np.int64)
+    look = np.maximum(1, np.round(people.look_s / STEP_S)).astype(np.int64)
+    ratio = np.exp(0.5 * people.imbalance * rng.standard_normal(n))
+    hold, dead_band = people.hold[:, None], people.dead_band[:, None]
+    full = np.array([1.0, 1.0, FULL_UP_MPS])
+
+    where = np.zeros((n, 3))
+    speed = np.zeros((n, 3))
+    nearest = np.zeros(n, dtype=np.int64)
+    finished = np.full(n, count, dtype=np.int64)
+    aims = np.zeros((count, n, 3))  # bearing in rad, horizontal share, up in fractions
+    aim = np.zeros((n, 3))
+    held = np.zeros((n, 4))
+    first = np.zeros((n, 4))
+    hand = np.zeros((n, 4))
+    out = np.empty((n, count, 4))
+    flown_m = np.empty((n, count, 3))
+    wanted = np.empty((n, 4))
     for i in range(count):
-        if i % every == 0:
-            while nearest < last and (
-                (points[nearest + 1, 0] - x) ** 2 + (points[nearest + 1, 1] - y) ** 2
-                < (points[nearest, 0] - x) ** 2 + (points[nearest, 1] - y) ** 2
-            ):
-                nearest += 1
-            target = points[min(nearest + ahead, last)]
-            bearing = math.atan2(target[1] - y, target[0] - x) - heading + wander[i]
-            bearing = (bearing + math.pi) % (2.0 * math.pi) - math.pi
-            up_mps = plan.climb_mps + HEIGHT_GAIN * (plan.climb_mps * i * STEP_S - z)
-            up = up_mps / FULL_UP_MPS if abs(up_mps) > 0.04 else 0.0
-            if style is Style.STRAFE:
-                aim = (math.cos(bearing), math.sin(bearing), up)
-            else:
-                slower = max(0.25, math.cos(min(abs(bearing), 1.3)))
-                aim = (slower, who.gain * bearing / FULL_YAW_RADPS, up)
-        late.append(aim)
-        seen = late.popleft() if len(late) > delay else first_stick
-        ramp = min(1.0, i * STEP_S / who.ramp_s)
-        push = float(level[i]) * ramp
-        if style is Style.STRAFE:
-            wanted = (push * seen[0], push * seen[1], seen[2] + pulses[i], 0.0)
-        else:
-            turn = max(-1.0, min(1.0, seen[1])) if i >= delay else 0.0
-            wanted = (push * seen[0], 0.0, seen[2] + pulses[i], turn)
-        for k in range(4):
-            if abs(wanted[k] - held[k]) > who.hold or (wanted[k] == 0.0) != (held[k] == 0.0):
-                held[k] = wanted[k]
-            slow[k] += (1.0 - keep_hand) * (held[k] - slow[k])
-            hand[k] += (1.0 - keep_hand) * (slow[k] - hand[k])
-        out[i] = hand
-        c, s = math.cos(heading), math.sin(heading)
-        gain = 1.0 - keep_v
-        v_x = keep_v * v_x + gain * (c * hand[0] - s * hand[1] + drift[i, 0])
-        v_y = keep_v * v_y + gain * (s * hand[0] + c * hand[1] + drift[i, 1])
-        v_z = keep_v * v_z + gain * (FULL_UP_MPS * hand[2] + drift[i, 2])
-        x, y, z = x + v_x * STEP_S, y + v_y * STEP_S, z + v_z * STEP_S
-        heading += hand[3] * FULL_YAW_RADPS * STEP_S
-    if style is Style.STRAFE:
-        out[:, 0], out[:, 1] = towards_axes(out[:, 0], out[:, 1], who.axis_pull)
-    for axis in np.flatnonzero(np.abs(out).max(axis=0) > 0.05):
-        out[:, axis] += tremor(count, who, rng)
-    return on_pad(out, who)
+        for _ in range(2):
+            here = points[rows, nearest] - where
+            beyond = points[rows, np.minimum(nearest + 1, POINTS - 1)] - where
+            nearer = (beyond**2).sum(axis=1) < (here**2).sum(axis=1)
+            nearest = np.minimum(nearest + nearer, POINTS - 1)
+        finished = np.where((nearest >= end) & (finished == count), i, finished)
+        if (finished < i - 25).all():
+            break
+        target = points[rows, np.minimum(nearest + ahead, POINTS - 1)] - where
+        level_m = np.hypot(target[:, 0], target[:, 1])
+        distance_m = np.maximum(np.hypot(level_m, target[:, 2]), 1e-6)
+        bearing = np.arctan2(target[:, 1], target[:, 0]) - heading + astray[:, i]
+        bearing = np.where(tail_first < 0.0, bearing + math.pi, bearing)
+        bearing = (bearing + math.pi) % (2.0 * math.pi) - math.pi
+        meant = points[rows, np.minimum(nearest + 1, POINTS - 1)] - points[rows, nearest]
+        along = np.maximum(np.linalg.norm(meant, axis=1), 1e-6)
+        error_m = points[rows, nearest, 2] - where[:, 2]
+        error_m = np.where(np.abs(error_m) > HEIGHT_SEEN_M, error_m, 0.0)
+        up = (push * meant[:, 2] / along + HEIGHT_GAIN * error_m) / FULL_UP_MPS
+        decides = i % decide == 0
+        aim[:, 0] = np.where(decides, bearing, aim[:, 0])
+        aim[:, 1] = np.where(decides, level_m / distance_m, aim[:, 1])
+        aim[:, 2] = np.where((i % look == 0) | (shapes.vertical & decides), up, aim[:, 2])
+        aims[i] = aim
+        seen = aims[np.maximum(i - delay, 0), rows]
+
+        cos, sin = np.cos(seen[:, 0]), np.sin(seen[:, 0])
+        ahead_share = people.strafe * cos + (1.0 - people.strafe) * np.maximum(cos, SLOWEST_TURN)
+        pushed = level[:, i] * seen[:, 1]
+        vx = tail_first * pushed * ahead_share * ratio
+        vy = pushed * people.strafe * sin * tail_first / ratio
+        vx, vy = towards_axes(vx, vy, people.axis_pull)
+        vx, vy = stepped(vx, vy, people.steps)
+        wanted[:, 0], wanted[:, 1] = vx * gate[:, i], vy * gate[:, i]
+        wanted[:, 2] = seen[:, 2] + height[:, i] + people.cross_talk * vx * 0.5
+        turn = np.clip(people.yaw * people.gain * seen[:, 0] / FULL_YAW_RADPS, -1.0, 1.0)
+        wanted[:, 3] = np.where(i >= delay, turn, 0.0)
+        moves = (np.abs(wanted - held) > hold) | (wanted == 0.0)
+        held = np.where(moves, wanted, held)
+        first = keep_hand * first + (1.0 - keep_hand) * held
+        hand = keep_hand * hand + (1.0 - keep_hand) * first
+        stick = np.clip(hand * noise[:, i], -1.0, 1.0)
+        out[:, i] = stick
+        stick = alive(stick, dead_band)
+        cos, sin = np.cos(heading), np.sin(heading)
+        world = np.stack(
+            [
+                cos * stick[:, 0] - sin * stick[:, 1],
+                sin * stick[:, 0] + cos * stick[:, 1],
+                stick[:, 2],
+            ],
+            axis=1,
+        )
+        speed = keep_vehicle * speed + (1.0 - keep_vehicle) * (world * full + air[:, i])
+        where = where + speed * STEP_S
+        flown_m[:, i] = where
+        heading = heading + stick[:, 3] * FULL_YAW_RADPS * STEP_S
+    out = out[:, : i + 1]
+    pressed = np.round(rng.uniform(*PRESS_S, n) / STEP_S).astype(np.int64)
+    samples = np.clip(finished + pressed, 2, i + 1)
+    return shaken(out, people, rng), samples, flown_m[:, : i + 1]

@@ -1,6 +1,7 @@
-"""What an operator means: the four primitives as velocities for hands, as paths for pilots.
+"""What people are asked to perform: the four primitives, as a direction of travel over progress.
 
-Headings are in rad, counter-clockwise about z up; sticks are fractions of full stick.
+Rows are performances. A shape lies in the horizontal plane, or in a vertical one. Directions are in
+rad, counter-clockwise about z up; in a vertical plane they grow from ahead to up.
 """
 
 import math
@@ -9,123 +10,185 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from training.generator.people import People, Style
 
-HAND_DURATIONS_S = {"line": (1.2, 5.0), "arc": (1.5, 6.5), "sine": (2.6, 8.0), "helix": (2.0, 7.5)}
-"""The thesis aimed at 2 s at least; its sinusoids last 229 samples, 5 s, on average."""
-PATH_STEP_M = 0.05
-STEPPED_SHARE = 0.25
-"""Share of curved primitives that begin with a straight piece, as people do when they start."""
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+DURATION_S = {"line": (2.3, 0.38), "arc": (2.7, 0.36), "sine": (4.8, 0.25), "helix": (3.1, 0.36)}
+"""Median and log deviation (chosen so that lengths are as in the thesis: at least 2 s was the aim,
+less than 1 s dropped, a sine has 229 samples on average and 375 at most, at 45 Hz)."""
+LONGEST_S = {"line": 8.0, "arc": 8.0, "sine": 7.9, "helix": 8.0}
+SHORTEST_S = 1.1
+VERTICAL_SHARE = {"line": 0.2, "arc": 0.06, "sine": 0.06, "helix": 0.0}
+STRAIGHT_SHARE = 0.25
+"""Curved primitives that begin with a straight piece."""
+PILOT_QUICKER = 0.7
+"""A vehicle's lag and a pilot's corrections come on top of the time a path should take."""
+YAW_SWEEP_SHARE = 0.6
+"""Who turns the vehicle by yaw flies smaller sweeps: full stick is 1 rad/s on the tum plant."""
+COMPASS_SHARE = 0.5
+"""Those who set out in one of the pad's eight directions (figure 3.2 of the thesis shows six)."""
+LEAST_SWEEP_RAD = math.radians(70.0)
+TAIL_FIRST_SHARE = 0.1
+MOST_TURN_RADPS = 0.85
+"""The fastest turn that they plan."""
 
 
 @dataclass(frozen=True)
-class PathPlan:
-    """A path for a pilot, from the origin, and how fast it is to be flown.
+class Shapes:
+    """What n people are asked for; each field (n,).
 
     Attributes:
-        points_m: (N, 2) every `PATH_STEP_M`.
-        speed_mps: along the path.
-        climb_mps: vertical speed meant throughout.
+        duration_s: how long it should take.
+        start_rad: the first direction, relative to the vehicle's heading.
+        vertical: whether it lies in a vertical plane, whose horizontal direction is `plane_rad`.
+        plane_rad: that direction.
+        sweep_rad: turn of an arc from beginning to end, 0 otherwise.
+        cycles: periods of a sine.
+        slope: a sine's steepest slope against its axis, 0 otherwise.
+        phase_rad: where in its period a sine begins.
+        along_axis: whether a sine's axis is held while the other swings, instead of the speed.
+        straight: share of the performance before a curve begins.
+        climb: vertical share of a helix, of its horizontal speed.
+        bend_rad: a bend of the whole that was not asked for.
+        uneven: an arc that tightens (> 0), a swing that grows.
     """
 
-    points_m: Array
-    speed_mps: float
-    climb_mps: float
+    duration_s: Array
+    start_rad: Array
+    vertical: Mask
+    plane_rad: Array
+    sweep_rad: Array
+    cycles: Array
+    slope: Array
+    phase_rad: Array
+    along_axis: Mask
+    straight: Array
+    climb: Array
+    bend_rad: Array
+    uneven: Array
 
+    def direction(self, progress: Array) -> Array:
+        """Direction of travel (n, k) in the shape's plane at progress (n, k), 0 to 1 and beyond."""
+        done = self._curved(progress)
+        warped = done + self.uneven[:, None] * done * (done - 1.0) * 0.8
+        swing = 1.0 + 1.2 * self.uneven[:, None] * (done - 0.5)
+        wave = np.arctan(self.slope[:, None] * swing * np.cos(self._phase(done)))
+        # A shape that begins straight goes on in that direction.
+        wave -= np.where(
+            self.straight > 0.0, np.arctan(self.slope * swing[:, 0] * np.cos(self.phase_rad)), 0.0
+        )[:, None]
+        bend = self.bend_rad[:, None] * (progress - 0.5)
+        turned = self.sweep_rad[:, None] * warped + wave + bend
+        return np.asarray(self.start_rad[:, None] + turned)
 
-def _straight_start(label: str, rng: np.random.Generator, duration_s: float) -> float:
-    """Seconds of straight flight before a curve begins."""
-    if label == "line" or rng.random() > STEPPED_SHARE:
-        return 0.0
-    return float(rng.uniform(0.15, min(1.0, 0.25 * duration_s)))
-
-
-def hand_plan(label: str, rng: np.random.Generator, step_s: float) -> Array:
-    """A primitive as a hand means it: quick gestures and slow wide turns alike.
-
-    Returns:
-        (N, 3) forward, left, up every `step_s`, before arm and thumb blur it.
-    """
-    duration_s = rng.uniform(*HAND_DURATIONS_S[label])
-    t = np.arange(0.0, duration_s, step_s)
-    start_rad = rng.uniform(-math.pi, math.pi)
-    sense = rng.choice((-1.0, 1.0))
-    magnitude = rng.uniform(0.3, 1.0)
-    up = np.zeros_like(t)
-    straight_s = _straight_start(label, rng, duration_s)
-    curved_t = np.maximum(t - straight_s, 0.0)
-    level = np.full_like(t, magnitude)
-
-    if label == "line":
-        heading = np.full_like(t, start_rad)
-        kind = rng.random()
-        if kind < 0.12:
-            level = np.zeros_like(t)
-            up = np.full_like(t, sense * magnitude)
-        elif kind < 0.3:
-            up = np.full_like(t, sense * rng.uniform(0.1, 0.8))
-    elif label in ("arc", "helix"):
-        # A gesture turns by 50 to 420 degrees whatever its length; a steered turn is slow and wide.
-        if rng.random() < 0.65:
-            sweep_rad = math.radians(rng.uniform(50.0, 420.0))
-            rate = sweep_rad / max(duration_s - straight_s, 1.0)
-        else:
-            rate = rng.uniform(0.14, 0.6)
-        heading = start_rad + sense * rate * curved_t
-        if label == "helix":
-            up = np.full_like(t, rng.choice((-1.0, 1.0)) * rng.uniform(0.15, 0.9))
-    else:
-        half_periods = rng.uniform(1.6, 4.5)
-        period_s = max(2.0 * (duration_s - straight_s) / half_periods, 0.9)
-        phase = rng.uniform(-0.6, 0.6) + (math.pi if sense < 0 else 0.0)
-        swing = rng.uniform(0.45, 2.0)
-        wave = np.where(
-            t < straight_s, 0.0, swing * np.cos(2.0 * math.pi * curved_t / period_s + phase)
+    def speed(self, progress: Array) -> Array:
+        """Speed (n, k) along the path, of the largest."""
+        swing = (self.slope[:, None] * np.cos(self._phase(self._curved(progress)))) ** 2
+        return np.where(
+            self.along_axis[:, None], np.sqrt((1.0 + swing) / (1.0 + self.slope[:, None] ** 2)), 1.0
         )
-        heading = start_rad + np.arctan(wave)
-        if rng.random() >= 0.5:
-            # One axis is held, and the other swings on its own.
-            level = magnitude * np.sqrt(1.0 + wave**2) / math.sqrt(1.0 + swing**2)
-        if rng.random() < 0.1:
-            up = np.full_like(t, rng.uniform(-0.15, 0.15))
-    return np.stack([level * np.cos(heading), level * np.sin(heading), up], axis=1)
+
+    def _curved(self, progress: Array) -> Array:
+        straight = self.straight[:, None]
+        return np.maximum((progress - straight) / (1.0 - straight), 0.0)
+
+    def _phase(self, done: Array) -> Array:
+        return 2.0 * math.pi * self.cycles[:, None] * done + self.phase_rad[:, None]
 
 
-def path_plan(label: str, rng: np.random.Generator) -> PathPlan:
-    """A primitive as a pilot means it: metres in the world at 0.4 to 1 m/s."""
-    speed_mps = rng.uniform(0.4, 1.0)
-    climb_mps = 0.0
-    sense = rng.choice((-1.0, 1.0))
-    length_m = speed_mps * rng.uniform(2.5, 9.0)
-    s = np.arange(0.0, length_m + 3.0, PATH_STEP_M)
-    straight_m = speed_mps * _straight_start(label, rng, 4.0)
-    bend = np.maximum(s - straight_m, 0.0)
+def ask(
+    label: str,
+    people: People,
+    style: Style,
+    rng: np.random.Generator,
+    scatter: float = 1.0,
+    compass_share: float = COMPASS_SHARE,
+) -> Shapes:
+    """What these people are asked to perform, and how far from it they will be.
+
+    Args:
+        label: one of the four primitives.
+        people: who.
+        style: how they make shapes.
+        rng: source of it all.
+        scatter: how widely shapes differ from the textbook's; 0 is always the same.
+        compass_share: share of those who set out in one of eight directions.
+    """
+    n = len(people)
+    sense = rng.choice((-1.0, 1.0), n)
+    median_s, deviation = DURATION_S[label]
+    if style is Style.PILOT:
+        median_s *= PILOT_QUICKER
+    duration_s = median_s * np.exp(deviation * rng.standard_normal(n))
+    compass = np.round(rng.uniform(-4.0, 4.0, n)) * (math.pi / 4.0)
+    anywhere = rng.uniform(-math.pi, math.pi, n)
+    heading_rad = np.where(rng.random(n) < compass_share, compass, anywhere)
+    # Who turns the vehicle mostly flies it nose or tail first.
+    nose = np.where(rng.random(n) < TAIL_FIRST_SHARE, math.pi, 0.0)
+    heading_rad = np.where(people.yaw > 0.5, nose, heading_rad)
+    heading_rad = heading_rad + people.heading_rad * scatter * rng.standard_normal(n)
+    zeros, no = np.zeros(n), np.zeros(n, dtype=bool)
+    vertical = rng.random(n) < VERTICAL_SHARE[label]
+    sweep_rad, slope, cycles, phase_rad, climb = zeros, zeros, np.ones(n), zeros, zeros
+    straight, along_axis = zeros, no
+    start_rad = heading_rad
+    if label != "line":
+        some = rng.random(n) < STRAIGHT_SHARE
+        straight = np.where(some, rng.uniform(0.05, 0.25, n), 0.0)
     if label == "line":
-        points = np.stack([s, np.zeros_like(s)], axis=1)
-        if rng.random() < 0.2:
-            climb_mps = rng.uniform(-0.3, 0.3)
-        heading_error_rad = rng.normal(0.0, 0.12)
-        return PathPlan(_turned(points, heading_error_rad), speed_mps, climb_mps)
-    if label in ("arc", "helix"):
-        radius_m = math.exp(rng.uniform(math.log(1.2), math.log(6.5)))
-        angle = bend / radius_m
-        x = radius_m * np.sin(angle) + np.minimum(s, straight_m)
-        points = np.stack([x, sense * radius_m * (1.0 - np.cos(angle))], axis=1)
+        # Up, down, or slanting.
+        elevation = rng.choice((-1.0, 1.0), n) * np.where(
+            rng.random(n) < 0.4, math.pi / 2.0, rng.uniform(0.2, 1.2, n)
+        )
+        start_rad = np.where(vertical, elevation, start_rad)
+    elif label == "sine":
+        # The window of 200 samples is to hold an inflection (thesis 4.1): periods of 6 s at most.
+        usual_s = 3.3 if style is Style.HAND else 3.6
+        period_s = usual_s * np.exp(0.3 * scatter * rng.standard_normal(n))
+        period_s = np.clip(period_s, 1.4 if style is Style.HAND else 2.4, 6.0)
+        cycles = np.clip(duration_s / period_s, 0.85, 3.0)
+        duration_s = cycles * period_s
+        slope = np.exp(rng.normal(math.log(1.0), 0.35, n))
+        offset = np.where(rng.random(n) < 0.2, rng.uniform(-1.5, 1.5, n), rng.normal(0.0, 0.35, n))
+        phase_rad = np.where(sense > 0.0, 0.0, math.pi) + scatter * offset
+        along_axis = rng.random(n) < 0.5
+        start_rad = np.where(vertical, 0.0, heading_rad)
+    else:
+        turns = np.where(
+            rng.random(n) < 0.6, rng.uniform(70.0, 200.0, n), rng.uniform(180.0, 420.0, n)
+        )
+        sweep_rad = sense * np.radians(150.0 + min(scatter, 1.0) * (turns - 150.0))
+        sweep_rad = np.where(people.yaw > 0.5, YAW_SWEEP_SHARE * sweep_rad, sweep_rad)
+        sweep_rad = np.sign(sweep_rad) * np.maximum(np.abs(sweep_rad), LEAST_SWEEP_RAD)
+        # Larger sweeps take longer.
+        duration_s = duration_s * (np.abs(sweep_rad) / 2.6) ** 0.25
         if label == "helix":
-            climb_mps = rng.choice((-1.0, 1.0)) * rng.uniform(0.07, 0.45)
-        return PathPlan(points, speed_mps, climb_mps)
-    # The thesis asks that the window hold an inflection, so a period is rarely over 8 s long.
-    wavelength_m = min(rng.uniform(2.5, 8.0), 9.0 * speed_mps)
-    amplitude_m = wavelength_m * rng.uniform(0.09, 0.3)
-    phase = rng.uniform(-0.6, 0.6)
-    x = np.maximum(s - straight_m, 0.0)
-    k = 2.0 * math.pi / wavelength_m
-    y = sense * amplitude_m * (np.sin(k * x + phase) - math.sin(phase))
-    points = np.stack([s, y], axis=1)
-    first_slope = sense * amplitude_m * k * math.cos(phase) if straight_m == 0.0 else 0.0
-    return PathPlan(_turned(points, -math.atan(first_slope)), speed_mps, 0.0)
+            climb = rng.choice((-1.0, 1.0), n) * np.exp(rng.normal(math.log(0.7), 0.45, n))
+        start_rad = np.where(vertical, anywhere, heading_rad)
+    shapes = Shapes(
+        duration_s=np.clip(duration_s, SHORTEST_S, LONGEST_S[label]),
+        start_rad=start_rad,
+        vertical=vertical,
+        plane_rad=heading_rad,
+        sweep_rad=sweep_rad,
+        cycles=cycles,
+        slope=slope,
+        phase_rad=phase_rad,
+        along_axis=along_axis,
+        straight=straight,
+        climb=climb,
+        bend_rad=scatter * people.bend_rad * rng.standard_normal(n),
+        uneven=np.clip(scatter * people.uneven * rng.standard_normal(n), -0.8, 0.8),
+    )
+    return _feasible(shapes, people)
 
 
-def _turned(points_m: Array, angle_rad: float) -> Array:
-    c, s = math.cos(angle_rad), math.sin(angle_rad)
-    return np.asarray(points_m @ np.array([[c, s], [-s, c]]))
+def _feasible(shapes: Shapes, people: People) -> Shapes:
+    """Who steers by yaw takes as long as the sharpest turn of the shape needs."""
+    progress = np.linspace(0.0, 1.0, 60)[None].repeat(len(people), axis=0)
+    per_progress = np.abs(np.diff(shapes.direction(progress), axis=1)).max(axis=1) * 59.0
+    needed_s = np.where(people.yaw > 0.5, per_progress / MOST_TURN_RADPS, 0.0)
+    duration_s = np.clip(np.maximum(shapes.duration_s, needed_s), SHORTEST_S, 8.2)
+    return Shapes(**(vars(shapes) | {"duration_s": duration_s}))
