@@ -9,7 +9,7 @@ from pathlib import Path
 
 from services.classifier.model import ModelError, OnnxModel
 
-LOOK_PERIOD_S = 0.5
+LOOK_PERIOD_S = 0.2
 
 Signature = tuple[int, int, int]
 
