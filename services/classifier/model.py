@@ -10,7 +10,7 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
-from common.messages import PRIMITIVES
+from common.messages import NONE_LABEL, PRIMITIVES
 from services.classifier.window import MODEL_RATE_HZ
 
 Array = NDArray[np.float64]
@@ -185,12 +185,10 @@ class OnnxModel:
         given = {i.name: (i.type, len(i.shape)) for i in self._session.get_inputs()}
         if given != _WANTED_INPUTS:
             raise ModelError(f"model {self._path}: its inputs are {given}, not {_WANTED_INPUTS}")
-        outputs = {o.name for o in self._session.get_outputs()}
-        if outputs != set(OUTPUTS):
-            raise ModelError(
-                f"model {self._path}: its outputs are {', '.join(sorted(outputs))},"
-                f" not {', '.join(OUTPUTS)}"
-            )
+        outputs = {o.name: o.type for o in self._session.get_outputs()}
+        wanted = dict.fromkeys(OUTPUTS, "tensor(float)")
+        if outputs != wanted:
+            raise ModelError(f"model {self._path}: its outputs are {outputs}, not {wanted}")
 
     def _probe(self) -> None:
         """Ask it: a graph with frozen axes, without softmax, or with 0/0 at rest shows at once."""
@@ -232,6 +230,8 @@ def _labels(path: Path, metadata: dict[str, str]) -> tuple[str, ...]:
         or len(set(labels)) != len(labels)
     ):
         raise ModelError(f"model {path}: its labels are no list of names: {labels}")
+    if NONE_LABEL in labels:
+        raise ModelError(f"model {path}: its labels hold {NONE_LABEL!r}, which is said by `meant`")
     missing = [label for label in PRIMITIVES if label not in labels]
     if missing:
         raise ModelError(f"model {path}: its labels lack {', '.join(missing)}")

@@ -34,7 +34,7 @@ class ModelFile:
         self.model = OnnxModel(path)
         self.fault = ""
         self._check: threading.Thread | None = None
-        self._outcome: OnnxModel | ModelError | None = None
+        self._outcome: OnnxModel | ModelError
 
     @property
     def is_checking(self) -> bool:
@@ -60,6 +60,7 @@ class ModelFile:
         self._seen = now
         if settled and now != self._taken:
             self._taken = now
+            self._outcome = ModelError(f"model {self._path}: could not be checked, see the log")
             self._check = threading.Thread(target=self._read, name="model", daemon=True)
             self._check.start()
 

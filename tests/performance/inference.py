@@ -5,8 +5,8 @@ each figure stands what it is measured against, timed in the same run, turn by t
 """
 
 import argparse
-import io
 import json
+import tempfile
 import threading
 import warnings
 from collections.abc import Callable, Sequence
@@ -135,21 +135,21 @@ def thesis_network() -> Callable[[NDArray[np.float32]], object]:
     from training.evaluation.thesis import Network
     from training.labels import PRIMITIVES
 
-    file = io.BytesIO()
-    with warnings.catch_warnings():
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         # Of batches of several series, which there are none of.
         warnings.simplefilter("ignore")
+        path = Path(folder) / "thesis.onnx"
         torch.onnx.export(
             Network(len(PRIMITIVES)).eval(),
             (torch.zeros(1, 3, WINDOW_SAMPLES),),
-            file,
+            str(path),
             input_names=["series"],
             dynamic_axes={"series": {2: "time"}},
             dynamo=False,
         )
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    session = onnxruntime.InferenceSession(file.getvalue(), options)
+        session = onnxruntime.InferenceSession(path.read_bytes(), options)
     return lambda sticks: session.run(
         None, {"series": np.ascontiguousarray(sticks[None, :, :3].transpose(0, 2, 1))}
     )

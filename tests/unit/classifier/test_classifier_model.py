@@ -40,6 +40,13 @@ def test_more_primitives_than_the_four_are_welcome(tmp_path: Path) -> None:
         ({"metadata": {**GOOD, "labels": "line"}}, "labels"),
         ({"metadata": {**GOOD, "labels": "[1, 2]"}}, "labels"),
         ({"metadata": {**GOOD, "labels": '["line", "arc", "sine"]'}, "classes": 3}, "helix"),
+        (
+            {
+                "metadata": {**GOOD, "labels": '["line", "arc", "sine", "helix", "none"]'},
+                "classes": 5,
+            },
+            "none",
+        ),
         ({"metadata": {k: v for k, v in GOOD.items() if k != "confidence_min"}}, "confidence_min"),
         ({"metadata": {**GOOD, "confidence_min": "sure"}}, "confidence_min"),
         ({"metadata": {**GOOD, "confidence_min": "nan"}}, "confidence_min"),
