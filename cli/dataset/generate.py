@@ -1,6 +1,7 @@
 """`autocomplete dataset generate`: a set by simulated operators."""
 
 import argparse
+from functools import partial
 
 from rich.console import Console
 
@@ -55,7 +56,7 @@ def _multiple(text: str) -> float:
 def _run(options: argparse.Namespace) -> int:
     with shared.training_installed():
         from training.dataset.store import save
-        from training.generator.dataset import counts_of, generate
+        from training.generator.dataset import THESIS, counts_of, generate, populate
     counts = counts_of(options.multiple)
     if options.none:
         counts[NONE] = options.none
@@ -65,7 +66,8 @@ def _run(options: argparse.Namespace) -> int:
         def advance(more: int) -> None:
             progress.advance(task, more)
 
-        primitives = generate(options.operators, counts, options.seed, progress=advance)
+        make = partial(populate, THESIS) if options.preset == "thesis" else generate
+        primitives = make(options.operators, counts, options.seed, progress=advance)
     made = f"generate --preset {options.preset} --operators {options.operators}"
     save(options.out, primitives, {"made": f"{made} --seed {options.seed}"})
     print(f"{options.out}: {len(primitives)} primitives by {options.operators} operators")

@@ -132,6 +132,20 @@ def test_a_key_moves_the_stick_and_letting_go_is_neutral(client, world, open_pag
     assert len(sent) == count
 
 
+@pytest.mark.parametrize("path", PAGES)
+def test_the_end_of_a_primitive_is_a_key_or_a_press(client, world, open_page, path):
+    page = open_page(path)
+    wait_until(page, lambda: is_offered(page))
+    # Whoever flew in the test before has the pad for a second more.
+    page.wait_for_timeout(1100)
+    sent = client.collect("console/stick")
+    for end in (lambda: page.keyboard.press("e"), lambda: page.click("#mark")):
+        begin = len(sent)
+        end()
+        wait_until(page, lambda b=begin: any(m.get("buttons") == ["end"] for m in sent[b:]))
+        wait_until(page, lambda: not sent[-1].get("buttons"))
+
+
 def test_shortcuts_of_the_browser_do_not_land_the_drone(world, open_page, requests):
     page = open_page("/")
     wait_until(page, lambda: is_offered(page))

@@ -130,14 +130,20 @@ def test_stats_count_and_draw(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 
 def test_generate_makes_the_same_set_for_the_same_seed(tmp_path: Path) -> None:
-    small = ("--operators", 3, "--multiple", 0.004, "--seed", 7)
+    small = ("--operators", 3, "--multiple", 0.004, "--none", 3, "--seed", 7)
     for name in ("a.npz", "b.npz"):
         assert dataset("generate", "--out", tmp_path / name, *small) == 0
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
     found = load(tmp_path / "a.npz")
-    assert {p.label for p in found} == {"line", "arc", "sine", "helix"}
+    assert {p.label for p in found} == {"line", "arc", "sine", "helix", "none"}
     assert len({p.operator for p in found}) == 3
     assert dataset("check", tmp_path / "a.npz") == 0
+
+
+def test_generate_makes_the_population_of_the_thesis(tmp_path: Path) -> None:
+    out = tmp_path / "a.npz"
+    assert dataset("generate", "--out", out, "--preset", "thesis", "--multiple", 0.004) == 0
+    assert {p.source for p in load(out)} == {"generator thesis seed 0"}
 
 
 @pytest.mark.parametrize("command", ["import", "record", "generate", "stats", "check"])
