@@ -165,7 +165,7 @@ class StickWindow:
         self._filled += 1
 
 
-def newest_motion(sticks: Array, rate_hz: float) -> slice:
+def newest_motion(sticks: Array | Array32, rate_hz: float) -> slice:
     """Where the newest motion is in sticks (N, 3 or 4) at a constant rate: what flight would see.
 
     From its first push to its last; empty if there is none.
