@@ -20,8 +20,10 @@ COMMANDS = {
     "doctor": "what is installed, reachable and alive, and what to do about what is not",
     "record": "what flies, into an MCAP file",
     "dataset": "labelled sticks: import, record, generate, stats, check",
+    "worlds": "the places to fly in, and pictures of them",
     "contract": "print the wire contract, made from the code",
     "train": "make the model that recognises primitives, and its card",
+    "evaluate": "every classifier on the same people, against the bars, as a report",
 }
 
 DEBUG = "AUTOCOMPLETE_DEBUG"

@@ -18,8 +18,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--world",
         metavar="WORLD",
-        choices=worlds.names(),
-        help=f"where to fly: {', '.join(worlds.names())} (track)",
+        type=_world,
+        help=f"where to fly: {', '.join(worlds.names())}, or a YAML file of your own (track)",
     )
     parser.add_argument(
         "--source",
@@ -30,6 +30,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
     opts.add_local_system(parser)
     parser.epilog = "Then open http://localhost:8080, press 'take off', and fly."
     parser.set_defaults(action=_run)
+
+
+def _world(text: str) -> str:
+    try:
+        return worlds.load(text).name
+    except worlds.WorldError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -13,7 +13,7 @@ class Config:
     """Configuration of the simulator."""
 
     world: str = "track"
-    """Where it starts: one of the files under worlds/."""
+    """Where it starts: one of `autocomplete worlds`, or the path of a YAML file like those."""
     plant: Plant = "tum"
     """How the vehicle follows the stick."""
     seed: int = 0
@@ -62,8 +62,10 @@ class Config:
     """Of the pictures, 1 to 100."""
 
     def __post_init__(self) -> None:
-        if self.world not in worlds.names():
-            raise ValueError(f"world: no {self.world!r}; there are {', '.join(worlds.names())}")
+        try:
+            worlds.load(self.world)
+        except worlds.WorldError as error:
+            raise ValueError(f"world: {error}") from None
         if self.plant not in PLANTS:
             raise ValueError(f"plant: no {self.plant!r}; there are {', '.join(PLANTS)}")
         if self.seed < 0:

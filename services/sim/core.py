@@ -179,6 +179,10 @@ class Simulation:
         """The vehicle's motion after the last step."""
         return self._state
 
+    def worlds(self) -> list[str]:
+        """The worlds that a reset may ask for: those that are shipped, and its own."""
+        return sorted({*worlds.names(), self._config.world})
+
     def scene(self) -> Scene:
         """What cameras see."""
         return self._stage.scene()
@@ -248,10 +252,11 @@ class Simulation:
         position_m, yaw_rad = self._position_m, self._yaw_rad
         world = self._world
         if request.world is not None and request.world != world.name:
-            try:
-                world = worlds.load(request.world)
-            except worlds.WorldError as error:
-                raise ResetError("world", str(error)) from None
+            if request.world not in self.worlds():
+                # Files of this machine are named by who starts it, not by who asks.
+                known = ", ".join(self.worlds())
+                raise ResetError("world", f"no world {request.world!r}; there are {known}")
+            world = worlds.load(request.world)
             position_m, yaw_rad = world.start_position_m, world.start_yaw_rad
         if request.position is not None:
             x, y, z = position_m = request.position

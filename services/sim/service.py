@@ -2,7 +2,6 @@
 
 from collections import deque
 
-import worlds
 from common import messages as m
 from common.clock import seconds
 from common.node import Node, RefusedError
@@ -73,7 +72,7 @@ def wire(node: Node, config: Config) -> None:
         return status
 
     def names(_request: m.WorldsRequest, _now_ns: int) -> m.WorldsReply:
-        return m.WorldsReply(worlds=worlds.names())
+        return m.WorldsReply(worlds=simulation.worlds())
 
     def health() -> tuple[m.HealthState, str]:
         factor = pace.real_time_factor

@@ -8,6 +8,9 @@ BGR, the order that OpenCV encodes.
 SUN = (-0.42, -0.33, 0.845)
 """Towards it, world."""
 MAX_LAYERS = 16
+HAZE = (0.78, 0.87, 0.93)
+"""What far things fade into."""
+HAZE_PER_M = 0.007
 
 _HEAD = f"""
 #version 330
@@ -30,10 +33,12 @@ vec3 uv_in_repeats() {
 }
 """
 
-_HAZE = """
-const vec3 HAZE = vec3(0.78, 0.87, 0.93);
+_HAZE = f"""
+const vec3 HAZE = vec3{HAZE};
 // By depth; an exponential would cost more than it shows.
-vec3 hazy(vec3 colour) { return mix(HAZE, colour, 1.0 / (1.0 + 0.007 / gl_FragCoord.w)); }
+vec3 hazy(vec3 colour) {{
+    return mix(HAZE, colour, 1.0 / (1.0 + {HAZE_PER_M} / gl_FragCoord.w));
+}}
 """
 
 BODY_VERTEX = f"""{_HEAD}{_PLACED}

@@ -40,8 +40,8 @@ class Paint:
 def paint(texture: Texture) -> Paint:
     """The paint of a texture; the same one each time."""
     painter, width_m, height_m = _PAINTERS[texture]
-    names = sorted(_PAINTERS)
-    generator = np.random.default_rng([_SEED, names.index(texture)])
+    # A new one at the end leaves the others as they are.
+    generator = np.random.default_rng([_SEED, list(_PAINTERS).index(texture)])
     # Painted finely, then averaged: what OpenGL reads most often must fit in a cache.
     picture = cv2.resize(painter(generator), (PIXELS, PIXELS), interpolation=cv2.INTER_AREA)
     return Paint(np.asarray(picture, np.uint8), width_m, height_m)
@@ -231,18 +231,83 @@ def _fence(generator: np.random.Generator) -> Picture:
     return _picture(colour, alpha)
 
 
+def _soil(generator: np.random.Generator) -> Picture:
+    colour = _blend((0.20, 0.13, 0.08), (0.42, 0.30, 0.19), noise(generator, 8, 8))
+    _spots(generator, colour, 700, (3, 14), (0.33, 0.23, 0.14))
+    _spots(generator, colour, 200, (2, 7), (0.55, 0.47, 0.36))
+    for _ in range(700):
+        x, y = (int(each) for each in generator.integers(0, CANVAS, 2))
+        dx, dy = (int(each) for each in generator.integers(-16, 17, 2))
+        cv2.line(colour, (x, y), (x + dx, y + dy), (0.52, 0.45, 0.26), 2)
+    return _picture(colour)
+
+
+def _roof(generator: np.random.Generator) -> Picture:
+    """Tiles in rows, each row half a tile on."""
+    colour = np.full((CANVAS, CANVAS, 3), 0.12, np.float32)
+    rows, columns = 16, 16
+    side = CANVAS // rows
+    for row in range(rows):
+        for column in range(columns + 1):
+            x = column * side - (row % 2) * side // 2
+            tone = np.random.default_rng([_SEED, 7, row, column % columns]).uniform(0.6, 1.25)
+            red = tone * np.asarray((0.58, 0.24, 0.15))
+            centre, axes = (x + side // 2, row * side), (side // 2 - 2, side - 3)
+            cv2.ellipse(colour, centre, axes, 0.0, 0.0, 180.0, red.tolist(), -1)
+    colour *= (0.7 + 0.5 * noise(generator, 16, 6))[..., None]
+    return _picture(colour)
+
+
+def _wood(generator: np.random.Generator) -> Picture:
+    """Upright planks with knots."""
+    grain = cv2.resize(noise(generator, 32, 5), (CANVAS, CANVAS * 4))[:CANVAS]
+    colour = _blend((0.36, 0.22, 0.12), (0.70, 0.50, 0.30), np.asarray(grain, np.float32))
+    for column in range(0, CANVAS, 128):
+        colour[:, column : column + 128] *= generator.uniform(0.75, 1.2)
+        colour[:, column : column + 7] *= 0.3
+        for _ in range(2):
+            y, x = (
+                int(generator.integers(60, CANVAS - 60)),
+                column + int(generator.integers(30, 98)),
+            )
+            cv2.ellipse(colour, (x, y), (13, 22), 0.0, 0.0, 360.0, (0.22, 0.12, 0.06), -1)
+            cv2.ellipse(colour, (x, y), (22, 36), 0.0, 0.0, 360.0, (0.30, 0.18, 0.10), 3)
+    return _picture(colour)
+
+
+def _metal(generator: np.random.Generator) -> Picture:
+    """Galvanised sheets with rivets, labels and rust."""
+    colour = _blend((0.55, 0.58, 0.60), (0.80, 0.82, 0.83), noise(generator, 16, 7))
+    for at in range(0, CANVAS, 256):
+        colour[at : at + 8] *= 0.45
+        colour[:, at : at + 8] *= 0.45
+        for other in range(32, CANVAS, 64):
+            cv2.circle(colour, (other, at + 24), 7, (0.35, 0.36, 0.38), -1)
+            cv2.circle(colour, (at + 24, other), 7, (0.35, 0.36, 0.38), -1)
+    rust = noise(generator, 8, 7) > 0.85
+    colour[rust] = colour[rust] * 0.4 + np.asarray((0.33, 0.17, 0.08))
+    for x, y, rgb in ((330, 340, (0.95, 0.75, 0.05)), (820, 620, (0.75, 0.10, 0.08))):
+        cv2.rectangle(colour, (x, y), (x + 110, y + 80), rgb, -1)
+        cv2.line(colour, (x + 12, y + 66), (x + 98, y + 14), (0.1, 0.1, 0.1), 8)
+    return _picture(colour)
+
+
 _PAINTERS: dict[
     Texture, tuple[Callable[[np.random.Generator], Picture], float | None, float | None]
 ] = {
     "asphalt": (_asphalt, 2.0, 2.0),
-    "grass": (_grass, 2.0, 2.0),
-    "concrete": (_concrete, 2.0, 2.0),
-    "fence": (_fence, 2.5, None),
-    "post": (_post, 1.0, 0.8),
-    "crate": (_crate, None, None),
     "brick": (_brick, 4.0, 4.0),
+    "concrete": (_concrete, 2.0, 2.0),
     "container": (_container, None, None),
+    "crate": (_crate, None, None),
+    "fence": (_fence, 2.5, None),
     "foliage": (_foliage, 3.0, 3.0),
+    "grass": (_grass, 2.0, 2.0),
+    "post": (_post, 1.0, 0.8),
+    "soil": (_soil, 2.0, 2.0),
+    "roof": (_roof, 2.5, 2.5),
+    "wood": (_wood, 2.0, 2.0),
+    "metal": (_metal, 2.0, 2.0),
 }
 
 

@@ -127,7 +127,7 @@ def test_the_doctor_says_what_to_do_about_what_is_missing(monkeypatch: pytest.Mo
         (["record", "--seconds", "-1"], "more than 0"),
         (["demo", "--console-port", "99999"], "--console-port: '99999': use a port, 1 to 65535"),
         (["up", "--console-port", "-1"], "--console-port: '-1': use a port, 1 to 65535"),
-        (["up", "--world", "nowhere"], "--world: invalid choice"),
+        (["up", "--world", "nowhere"], "--world: no world 'nowhere'; there are"),
         (["up", "--source", "nobody"], "--source: invalid choice"),
         (["demo", "--seed", "x"], "--seed: 'x': use a whole number from 0"),
         (["train", "--seed", "x"], "--seed: 'x': use a whole number from 0"),

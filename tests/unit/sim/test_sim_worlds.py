@@ -1,17 +1,101 @@
 """Worlds are read whole or refused with the file and the field."""
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import worlds
+from common.messages import ResetRequest
+from services.sim.config import Config
+from services.sim.core import STEP_S, ResetError, Simulation
+from services.sim.stage import Stage
 
 
 def test_every_world_that_is_shipped_loads() -> None:
-    assert {"empty", "track"} <= set(worlds.names())
+    shipped = {"building", "empty", "field", "gazebo", "pole", "track"}
+    assert set(worlds.names()) == shipped
     for name in worlds.names():
         assert worlds.load(name).name == name
+
+
+@pytest.mark.parametrize("name", worlds.names())
+def test_its_ideal_path_and_its_start_are_free(name: str) -> None:
+    world = worlds.load(name)
+    stage = Stage(world, STEP_S)
+    for x, y, z in [*world.ideal_path_m[::10], world.start_position_m]:
+        stage.place((x, y, max(z, 0.06)), 0.0)
+        assert not stage.overlaps(), (x, y, z)
+    stage.close()
+
+
+@pytest.mark.parametrize("name", worlds.names())
+def test_what_stands_in_it_is_what_pybullet_has(name: str) -> None:
+    world = worlds.load(name)
+    stage = Stage(world, STEP_S)
+    seen = {
+        (b.shape, b.texture, *np.round(b.size_m + b.position_m, 4)) for b in stage.scene().bodies
+    }
+    meant = {(b.shape, b.texture, *np.round(b.size_m + b.position_m, 4)) for b in world.bodies}
+    stage.close()
+    assert seen == meant
+
+
+def test_the_lap_around_the_gazebo_is_as_long_as_the_thesis_best() -> None:
+    gazebo = worlds.load("gazebo")
+    assert gazebo.closed
+    assert sum(s.length_m for s in gazebo.segments) == pytest.approx(30.15, abs=0.02)
+
+
+def test_a_helix_climbs_evenly_and_a_sine_keeps_to_its_axis() -> None:
+    pole = worlds.load("pole")
+    (helix,) = pole.segments
+    assert helix.length_m == pytest.approx(math.hypot(3.0 * 6.0 * math.pi, 5.4))
+    assert np.allclose(np.linalg.norm(pole.ideal_path_m[:, :2], axis=1), 3.0)
+    assert np.allclose(np.diff(pole.ideal_path_m[:, 2], 2), 0.0, atol=1e-9)
+    assert pole.ideal_path_m[-1, 2] == pytest.approx(6.4)
+    field = worlds.load("field")
+    x, y, _ = field.ideal_path_m.T
+    assert np.allclose(y, 2.0 * np.sin(2.0 * math.pi * x / 8.0), atol=1e-9)
+    assert x[-1] == pytest.approx(24.0, abs=1e-3)
+    steps_m = np.linalg.norm(np.diff(field.ideal_path_m, axis=0), axis=1)
+    assert steps_m.sum() == pytest.approx(field.segments[0].length_m, rel=1e-3)
+
+
+def test_rows_and_rings_repeat_a_body(tmp_path: Path) -> None:
+    file = tmp_path / "orchard.yaml"
+    file.write_text(
+        "description: trees\n"
+        "bodies:\n"
+        "  - {shape: box, size_m: [1, 1, 1], position_m: [1, 0, 2], texture: wood,"
+        " rows: [{count: 3, step_m: [2, 0, 0]}, {count: 2, step_m: [0, 5, 0]}]}\n"
+        "  - {shape: box, size_m: [1, 2, 1], position_m: [3, 1, 1], texture: wood,"
+        " ring: {count: 4, centre_m: [1, 1]}}\n"
+    )
+    bodies = worlds.load(str(file)).bodies
+    places = {tuple(np.round(b.position_m, 6)) for b in bodies[:6]}
+    assert places == {(x, y, 2.0) for x in (1.0, 3.0, 5.0) for y in (0.0, 5.0)}
+    ring = [b.position_m for b in bodies[6:]]
+    assert np.allclose(ring, [(3, 1, 1), (1, 3, 1), (-1, 1, 1), (1, -1, 1)])
+    # Each looks at the centre as the first does.
+    assert bodies[7].orientation == pytest.approx((0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)))
+
+
+def test_a_file_of_ones_own_is_a_world_by_its_path(tmp_path: Path) -> None:
+    file = tmp_path / "hall.yaml"
+    file.write_text("description: mine\nstart: {position_m: [1, 2, 0]}\n")
+    simulation = Simulation(Config(world=str(file)))
+    assert simulation.status().world == str(file)
+    assert simulation.state.position_m == pytest.approx((1.0, 2.0, 0.055))
+    assert simulation.reset(ResetRequest(world="empty")).world == "empty"
+    assert simulation.reset(ResetRequest(world=str(file))).world == str(file)
+    other = tmp_path / "other.yaml"
+    other.write_text("description: not named at the start\n")
+    with pytest.raises(ResetError, match="track"):
+        simulation.reset(ResetRequest(world=str(other)))
+    with pytest.raises(ValueError, match="missing"):
+        Config(world=str(tmp_path / "missing.yaml"))
 
 
 def test_track_is_a_closed_oval_of_55_m_flown_counter_clockwise() -> None:
@@ -78,6 +162,21 @@ def test_sampling_follows_an_arc_of_either_hand(tmp_path: Path) -> None:
         (
             "description: a\n"
             "bodies: [{shape: box, size_m: [1, 0, 1], position_m: [0, 0, 0], texture: crate}]",
+            "size_m",
+        ),
+        (
+            "description: a\nideal_path: {start_m: [0, 0, 1], segments:"
+            " [{primitive: sine, length_m: 5, amplitude_m: 1, wavelength_m: 4}]}",
+            "length_m",
+        ),
+        (
+            "description: a\nideal_path: {start_m: [0, 0, 1], segments:"
+            " [{primitive: line, length_m: 5, radius_m: 1}]}",
+            "radius_m",
+        ),
+        (
+            "description: a\n"
+            "bodies: [{shape: sphere, size_m: [1, 1, 2], position_m: [0, 0, 0], texture: crate}]",
             "size_m",
         ),
         (": : [", ""),
