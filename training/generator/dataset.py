@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from training.dataset.primitive import Primitive
 from training.generator import hands, nothing, observer, pilots
 from training.generator.noise import STEP_S, Array
-from training.generator.pad import read
+from training.generator.pad import read, worn_offset
 from training.generator.people import FAMILIES, THESIS_FAMILIES, Family, People, Style, draw_people
 from training.generator.shapes import COMPASS_SHARE, ask
 from training.labels import NONE, PRIMITIVES
@@ -22,6 +22,7 @@ CHUNK = 256
 TRIES_AT_ONCE = 48
 MOST_ROUNDS = 100
 NONE_S = (1.2, 8.5)
+OPEN_LOOP = {"rest": nothing.rest, "turn": nothing.turn, "free": nothing.free}
 
 IntArray = NDArray[np.int64]
 Messages = tuple[Array, Array]
@@ -147,23 +148,31 @@ def attempt(
     label: str, style: Style, people: People, population: Population, rng: np.random.Generator
 ) -> tuple[list[Messages], NDArray[np.bool_]]:
     """One try of each of these people, and whether an observer and the thesis' filters take it."""
+    offset = worn_offset(people, rng)
     if label == NONE:
-        sticks, samples, good = _nothing(people, rng)
+        sticks, samples, good = _nothing(people, offset, rng)
     else:
         shapes = ask(label, people, style, rng, population.difficulty, population.compass_share)
         if style is Style.HAND:
             sticks, samples = hands.draw(shapes, people, rng)
-            where_m = observer.flown_m(hands.alive(sticks, people.dead_band[:, None, None]))
+            where_m = _flown_m(sticks, offset, people)
         else:
-            sticks, samples, where_m = pilots.fly(shapes, people, rng)
+            sticks, samples, where_m = pilots.fly(shapes, people, offset, rng)
         path_m = observer.seen(where_m, samples)
         good = observer.looks_like(label, path_m, shapes.vertical, shapes.plane_rad)
-    messages = read(sticks, samples, people, rng, begun=label != NONE)
+    messages = read(sticks, samples, offset, people, rng, begun=label != NONE)
     fits = [t[-1] >= SHORTEST_S and len(t) <= LONGEST_SAMPLES for t, _ in messages]
     return messages, good & np.array(fits)
 
 
-def _nothing(people: People, rng: np.random.Generator) -> tuple[Array, IntArray, NDArray[np.bool_]]:
+def _flown_m(sticks: Array, offset: Array, people: People) -> Array:
+    """Where (n, k, 3) sticks (n, k, 4) take a vehicle that nobody watches."""
+    return observer.flown_m(hands.alive(sticks + offset[:, None], people.dead_band[:, None, None]))
+
+
+def _nothing(
+    people: People, offset: Array, rng: np.random.Generator
+) -> tuple[Array, IntArray, NDArray[np.bool_]]:
     """Sticks without a primitive in them, samples of each, and whether an observer agrees."""
     n = len(people)
     duration_s = np.clip(3.6 * np.exp(0.5 * rng.standard_normal(n)), *NONE_S)
@@ -171,19 +180,26 @@ def _nothing(people: People, rng: np.random.Generator) -> tuple[Array, IntArray,
     count = int(samples.max())
     sticks = np.zeros((n, count, 4))
     kinds = rng.choice(len(nothing.KINDS), n, p=list(nothing.KINDS.values()))
-    for kind, act in enumerate((nothing.rest, nothing.turn, nothing.hover, nothing.free)):
+    for kind, name in enumerate(nothing.KINDS):
         rows = np.flatnonzero(kinds == kind)
-        if len(rows):
-            sticks[rows] = act(people.take(rows), count, rng)
+        if len(rows) == 0:
+            continue
+        actors = people.take(rows)
+        if name == "hover":
+            sticks[rows] = nothing.hover(actors, count, offset[rows], rng)
+        else:
+            sticks[rows] = OPEN_LOOP[name](actors, count, rng)
     good = np.ones(n, dtype=bool)
     free = np.flatnonzero(kinds == list(nothing.KINDS).index("free"))
     if len(free):
-        dead_band = people.dead_band[free, None, None]
-        where_m = observer.flown_m(hands.alive(sticks[free], dead_band))
+        where_m = _flown_m(sticks[free], offset[free], people.take(free))
         path_m = observer.seen(where_m, samples[free])
-        level, ahead = np.zeros(len(free), dtype=bool), np.zeros(len(free))
+        ends_m = path_m[:, -1] - path_m[:, 0]
+        ahead_rad = np.arctan2(ends_m[:, 1], ends_m[:, 0])
         for label in PRIMITIVES:
-            good[free] &= ~observer.looks_like(label, path_m, level, ahead)
+            for vertical in (False, True):
+                plane = np.full(len(free), vertical)
+                good[free] &= ~observer.looks_like(label, path_m, plane, ahead_rad)
     return sticks, samples, good
 
 
@@ -195,8 +211,9 @@ def hovering(
     rng = np.random.default_rng(seed)
     people = draw_people(members, rng)
     count = round(seconds / STEP_S) + 1
-    sticks = nothing.hover(people, count, rng)
-    messages = read(sticks, np.full(operators, count), people, rng, begun=False)
+    offset = worn_offset(people, rng)
+    sticks = nothing.hover(people, count, offset, rng)
+    messages = read(sticks, np.full(operators, count), offset, people, rng, begun=False)
     source = f"generator hover seed {seed}"
     return [
         Primitive(times_s, read_, NONE, f"{family.name}-{number:04d}", family.name, source)

@@ -82,7 +82,7 @@ def shaken(sticks: Array, people: People, rng: np.random.Generator) -> Array:
 
 
 def alive(sticks: Array, dead_band: Array) -> Array:
-    """Sticks without those within the dead band."""
+    """Sticks without those within the dead band: what leaves a pad."""
     return np.where(np.abs(sticks) < dead_band, 0.0, sticks)
 
 

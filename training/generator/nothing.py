@@ -86,7 +86,7 @@ def free(people: People, count: int, rng: np.random.Generator) -> Array:
     return shaken(neuromuscular(held(wanted, people), people), people, rng)
 
 
-def hover(people: People, count: int, rng: np.random.Generator) -> Array:
+def hover(people: People, count: int, offset: Array, rng: np.random.Generator) -> Array:
     """Sticks (n, count, 4) of people who hold a vehicle in its place in wind.
 
     They push back what has moved away by more than they mind, and take the speed out of it again.
@@ -145,7 +145,7 @@ def hover(people: People, count: int, rng: np.random.Generator) -> Array:
         hand = keep_hand * hand + (1.0 - keep_hand) * first
         stick = np.clip(hand, -1.0, 1.0)
         out[:, i] = stick
-        stick = alive(stick, people.dead_band[:, None])
+        stick = alive(stick + offset, people.dead_band[:, None])
         world = np.stack(
             [
                 cos * stick[:, 0] - sin * stick[:, 1],

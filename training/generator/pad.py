@@ -14,20 +14,30 @@ BEGUN = 0.05
 """Before the first push of more than this, nothing is being performed."""
 
 
+def worn_offset(people: People, rng: np.random.Generator) -> Array:
+    """How far from neutral (n, 4) the axes of these people's pads rest."""
+    offset = people.worn[:, None] * rng.standard_normal((len(people), 4))
+    return np.clip(offset, -WORN_MOST, WORN_MOST)
+
+
 def read(
-    sticks: Array, samples: NDArray[np.int64], people: People, rng: np.random.Generator, begun: bool
+    sticks: Array,
+    samples: NDArray[np.int64],
+    offset: Array,
+    people: People,
+    rng: np.random.Generator,
+    begun: bool,
 ) -> list[tuple[Array, Array]]:
     """Times (N,) and sticks (N, 4) of each performance, as messages of a pad.
 
     Args:
         sticks: (n, k, 4) at `STEP_S`.
         samples: (n,) how many of the k are the performance.
+        offset: (n, 4) of worn pads.
         people: whose pads.
         rng: of intervals and losses.
         begun: whether to begin with the first push.
     """
-    worn = np.clip(people.worn[:, None] * rng.standard_normal((len(people), 4)), -1, 1)
-    offset = np.clip(worn, -WORN_MOST, WORN_MOST)
     read = []
     for row in range(len(people)):
         own = sticks[row, : samples[row]]

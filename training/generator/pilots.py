@@ -52,9 +52,15 @@ def path_m(shapes: Shapes, people: People, push: Array) -> Array:
 
 
 def fly(
-    shapes: Shapes, people: People, rng: np.random.Generator
+    shapes: Shapes, people: People, offset: Array, rng: np.random.Generator
 ) -> tuple[Array, NDArray[np.int64], Array]:
     """Sticks of pilots who steer the tum plant along shapes and correct what they see.
+
+    Args:
+        shapes: what each is asked for.
+        people: who.
+        offset: (n, 4) of their worn pads.
+        rng: source of it all.
 
     Returns:
         (n, k, 4) at `STEP_S`, how many of the k samples belong to each performance, and where
@@ -120,6 +126,7 @@ def fly(
             nearest = np.minimum(nearest + nearer, POINTS - 1)
         finished = np.where((nearest >= end) & (finished == count), i, finished)
         if (finished < i - 25).all():
+            out, flown_m = out[:, :i], flown_m[:, :i]
             break
         target = points[rows, np.minimum(nearest + ahead, POINTS - 1)] - where
         level_m = np.hypot(target[:, 0], target[:, 1])
@@ -156,7 +163,7 @@ def fly(
         hand = keep_hand * hand + (1.0 - keep_hand) * first
         stick = np.clip(hand * noise[:, i], -1.0, 1.0)
         out[:, i] = stick
-        stick = alive(stick, dead_band)
+        stick = alive(stick + offset, dead_band)
         cos, sin = np.cos(heading), np.sin(heading)
         world = np.stack(
             [
@@ -170,7 +177,6 @@ def fly(
         where = where + speed * STEP_S
         flown_m[:, i] = where
         heading = heading + stick[:, 3] * FULL_YAW_RADPS * STEP_S
-    out = out[:, : i + 1]
     pressed = np.round(rng.uniform(*PRESS_S, n) / STEP_S).astype(np.int64)
-    samples = np.clip(finished + pressed, 2, i + 1)
-    return shaken(out, people, rng), samples, flown_m[:, : i + 1]
+    samples = np.clip(finished + pressed, 2, out.shape[1])
+    return shaken(out, people, rng), samples, flown_m

@@ -29,6 +29,8 @@ YAW_SWEEP_SHARE = 0.6
 """Who turns the vehicle by yaw flies smaller sweeps: full stick is 1 rad/s on the tum plant."""
 COMPASS_SHARE = 0.5
 """Those who set out in one of the pad's eight directions (figure 3.2 of the thesis shows six)."""
+YAW_SINE_SHARE = 0.75
+"""And gentler sines of fewer periods."""
 LEAST_SWEEP_RAD = math.radians(70.0)
 TAIL_FIRST_SHARE = 0.1
 MOST_TURN_RADPS = 0.85
@@ -149,8 +151,11 @@ def ask(
         period_s = usual_s * np.exp(0.3 * scatter * rng.standard_normal(n))
         period_s = np.clip(period_s, 1.4 if style is Style.HAND else 2.4, 6.0)
         cycles = np.clip(duration_s / period_s, 0.85, 3.0)
-        duration_s = cycles * period_s
         slope = np.exp(rng.normal(math.log(1.0), 0.35, n))
+        turning = people.yaw > 0.5
+        cycles = np.where(turning, np.maximum(YAW_SINE_SHARE * cycles, 0.85), cycles)
+        slope = np.where(turning, YAW_SINE_SHARE * slope, slope)
+        duration_s = cycles * period_s
         offset = np.where(rng.random(n) < 0.2, rng.uniform(-1.5, 1.5, n), rng.normal(0.0, 0.35, n))
         phase_rad = np.where(sense > 0.0, 0.0, math.pi) + scatter * offset
         along_axis = rng.random(n) < 0.5
