@@ -26,10 +26,11 @@ BEHIND = 4096
 """Sticks that wait at most while a set is written."""
 
 HOW = """\
-Perform the primitive with the sticks, then press a face button of the pad (triangle, circle, cross,
-square; Y, B, A, X), or E in the console. Rest before and after it is cut off. The button pressed
-again before the sticks move takes the last one back. Each one is saved at once: Ctrl-C ends, and
-the same --out goes on."""
+Perform the primitive with the sticks, then press a face button of the pad
+(triangle, circle, cross, square; Y, B, A, X), or E in the console. Rest before
+and after it is cut off. The button pressed again before the sticks move takes
+the last one back. Each one is saved at once: Ctrl-C ends, and the same --out
+goes on."""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:

@@ -46,39 +46,56 @@ class Outcome:
 
 @dataclass(frozen=True)
 class _Flown:
-    """How long the autopilot flew a suggestion, and why it stopped: "" if the recording ended."""
+    """A stretch under the autopilot: along what, when, and why it ended ("": it did not)."""
 
-    duration_s: float
+    suggestion: int
+    began_ns: int
+    ended_ns: int
     reason: str
 
     @property
     def fate(self) -> Fate:
-        if self.duration_s >= SOON_S or self.reason == "finished":
+        if self.ended_ns - self.began_ns >= nanoseconds(SOON_S) or self.reason == "finished":
             return "accepted"
         return "overridden" if self.reason in BY_THE_OPERATOR else "unclear"
 
 
 def outcomes_of(logged: Sequence[Logged]) -> list[Outcome]:
-    """The suggestions of a flight with their intents, in their order.
+    """What became of the suggestions of a flight: those flown, then those that were not.
+
+    A suggestion that is sent again, with a newer intent, is the same one: the intent that counts
+    is the newest before it was accepted, and what became last of that window.
 
     Args:
         logged: intents, suggestions and states of the autopilot as they arrived.
     """
     intents = [(e.log_ns, e.message) for e in logged if isinstance(e.message, m.Intent)]
-    flown = _flown(logged)
-    answered = []
+    offers = []
     for each in logged:
         if isinstance(each.message, m.Suggestion):
             intent = _intent_of(each.log_ns, intents)
             if intent is not None:
-                answered.append((each.message, intent))
-    taken = [intent for suggestion, intent in answered if suggestion.id in flown]
-    outcomes = []
-    for suggestion, intent in answered:
-        if suggestion.id in flown:
-            outcomes.append(Outcome(suggestion, intent, flown[suggestion.id].fate))
-        elif not any(_overlap(intent, other) for other in taken):
-            outcomes.append(Outcome(suggestion, intent, "ignored"))
+                offers.append((each.log_ns, each.message, intent))
+    fates: dict[tuple[int, int], Outcome] = {}
+    for flown in _flown(logged):
+        taken = [
+            (suggestion, intent)
+            for log_ns, suggestion, intent in offers
+            if suggestion.id == flown.suggestion and log_ns <= flown.began_ns
+        ]
+        if taken:
+            suggestion, intent = taken[-1]
+            outcome = Outcome(suggestion, intent, flown.fate)
+            fates[suggestion.id, intent.window_end] = outcome
+    outcomes = list(fates.values())
+    ids = {outcome.suggestion.id for outcome in outcomes}
+    windows = [outcome.intent for outcome in outcomes]
+    newest = {suggestion.id: (suggestion, intent) for _, suggestion, intent in offers}
+    outcomes += [
+        Outcome(suggestion, intent, "ignored")
+        for number, (suggestion, intent) in newest.items()
+        if number not in ids and not any(_overlap(intent, other) for other in windows)
+    ]
     return outcomes
 
 
@@ -96,9 +113,9 @@ def _overlap(one: m.Intent, other: m.Intent) -> bool:
     return one.window_start < other.window_end and other.window_start < one.window_end
 
 
-def _flown(logged: Sequence[Logged]) -> dict[int, _Flown]:
-    """Each suggestion that the autopilot flew."""
-    flown: dict[int, _Flown] = {}
+def _flown(logged: Sequence[Logged]) -> list[_Flown]:
+    """Each stretch that the autopilot flew."""
+    flown: list[_Flown] = []
     current, began_ns, last_ns = 0, 0, 0
     for each in logged:
         status = each.message
@@ -111,10 +128,10 @@ def _flown(logged: Sequence[Logged]) -> dict[int, _Flown]:
         if current:
             # Taking another suggestion says nothing against the one before.
             reason = "" if engaged else status.reason
-            flown[current] = _Flown((each.log_ns - began_ns) / NS_PER_S, reason)
-        current, began_ns = engaged, each.log_ns
+            flown.append(_Flown(current, began_ns, last_ns, reason))
+        current, began_ns = engaged, last_ns
     if current:
-        flown[current] = _Flown((last_ns - began_ns) / NS_PER_S, "")
+        flown.append(_Flown(current, began_ns, last_ns, ""))
     return flown
 
 

@@ -133,6 +133,18 @@ def test_a_suggestion_that_reached_the_recorder_before_its_intent_has_it_all_the
     assert [len(p) for p in found] == [151]
 
 
+def test_of_a_suggestion_sent_again_the_newest_window_before_it_was_accepted_counts(
+    tmp_path: Path,
+) -> None:
+    again = [*shown(1, 3.0), *shown(1, 4.0), *flown(1, 6.0, "stick", 4.5), *shown(1, 5.0)]
+    found, fates, _ = read_flight(flight(tmp_path / "f.mcap", again), "ana", "")
+    assert sum(fates.values()) == 1
+    assert [p.utc_ns for p in found] == [UTC_NS + S]
+    twice = [*shown(1), *flown(1, 1.0, "stick"), *flown(1, 5.0, "finished", 8.0)]
+    _, fates, _ = read_flight(flight(tmp_path / "g.mcap", twice), "ana", "")
+    assert (fates["overridden"], fates["accepted"]) == (0, 1)
+
+
 def test_a_suggestion_of_its_own_mind_keeps_its_primitive(tmp_path: Path) -> None:
     events = [intent("arc", 1.0, 4.0), suggestion(1, "line", 4.05), *flown(1, 5.0, "stick")]
     found, _, _ = read_flight(flight(tmp_path / "f.mcap", events), "ana", "")
