@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --disable-pip-version-check -c constraints.t
 SCRIPTS := .ci/run deploy/install
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo up check test test-compose bench train picture lock docs format clean
+.PHONY: help setup demo up check test test-compose bench flight properties train picture lock docs format clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -67,6 +67,12 @@ bench: setup $(VENV)/.all ## rates and latencies of the whole chain, as a table
 	$(BIN)/python tests/performance/bench.py $(ARGS)
 
 # --- making --------------------------------------------------------------------------------------
+
+flight: setup $(VENV)/.all ## how closely paths are flown, against other controllers: 20 minutes
+	$(BIN)/python tests/performance/flight.py $(ARGS)
+
+properties: setup $(VENV)/.all ## the autopilot's rules in 100 000 random steps, in two minutes
+	$(BIN)/python -m pytest tests/unit/autopilot/test_autopilot_properties.py -m slow $(ARGS)
 
 train: $(VENV)/.all ## train the model anew into models/
 	$(BIN)/autocomplete train $(ARGS)

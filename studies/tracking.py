@@ -32,7 +32,7 @@ RADIUS_M = 2.0
 SETTLED_M = 0.1
 SETTLED_MPS = 0.15
 START_LIMIT_S = 25.0
-FLIGHT_LIMIT_S = 120.0
+FLIGHT_LIMIT_S = 200.0
 RATE_HZ = 50
 PICTURES_HZ = 30.0
 """As many as the localizer looks at."""
@@ -238,7 +238,7 @@ def _fly(case: Case, chain: Lockstep, helmsman: _Helmsman, heading_rad: float) -
     around_m = np.vstack([path_m, path_m[:1]]) if closed else path_m
     whole_m = laps * float(np.linalg.norm(np.diff(around_m, axis=0), axis=1).sum())
     truths.clear()
-    begin_ns = chain.now_ns
+    begin_ns, first = chain.now_ns, len(statuses)
     chain.run_until(
         lambda: statuses[-1].mode != "engaged" or (closed and statuses[-1].progress > whole_m),
         FLIGHT_LIMIT_S,
@@ -248,11 +248,12 @@ def _fly(case: Case, chain: Lockstep, helmsman: _Helmsman, heading_rad: float) -
         reason = "flown" if closed and last.progress > whole_m else "too slow"
     else:
         reason = "flown" if last.reason == "finished" else last.reason
+    flown_along_m = max((status.progress for status in statuses[first:]), default=0.0)
     flown_m = np.array([pose.position for pose in truths])[::2]
     return Flight(
         reason,
         _distances(flown_m, resample(around_m, 0.01)),
-        whole_m / ((chain.now_ns - begin_ns) * 1e-9),
+        flown_along_m / ((chain.now_ns - begin_ns) * 1e-9),
         path_m,
         flown_m,
     )

@@ -28,8 +28,9 @@ class Disturbance:
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
         self._speeds: list[float] | None = None
-        # The speeds that the sticks ask for, as late as the plant has them.
-        self._asked = [0.0] * 4
+        self.asked = [0.0] * 4
+        """The speeds that the sticks ask for, as late as the plant has them: east, north, up in m/s
+        and about z in rad/s."""
         self.plane_mps2 = [0.0, 0.0]
         self.up_mps2 = 0.0
         self.yaw_radps2 = 0.0
@@ -51,14 +52,14 @@ class Disturbance:
         speeds = [*pose.velocity, pose.angular_velocity[2]]
         for axis, (value, response) in enumerate(zip(asked, responses, strict=True)):
             share = 1.0 if response.late_s == 0.0 else min(1.0, dt_s / response.late_s)
-            self._asked[axis] += share * (value - self._asked[axis])
+            self.asked[axis] += share * (value - self.asked[axis])
         if self._speeds is not None:
             values = [*self.plane_mps2, self.up_mps2, self.yaw_radps2]
             share = 1.0 - math.exp(-dt_s / TIME_S)
             for axis, response in enumerate(responses):
                 # The change of speed enters whole, the rest averaged: no speed is differentiated.
                 change = (speeds[axis] - self._speeds[axis]) / TIME_S
-                explained = response.rate_ps * (self._asked[axis] - self._speeds[axis])
+                explained = response.rate_ps * (self.asked[axis] - self._speeds[axis])
                 values[axis] += change - share * (explained + values[axis])
             self._set(values)
         self._speeds = speeds

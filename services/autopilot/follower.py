@@ -99,6 +99,10 @@ class Follower:
             age_s: how long ago it arrived; the pose is carried on by its speeds for so long.
             dt_s: time since the last call.
         """
+        return self._controller.sticks(pose, age_s, self.reference(pose, age_s, dt_s), dt_s)
+
+    def reference(self, pose: Pose, age_s: float, dt_s: float) -> Reference:
+        """Where on the path the vehicle should be now; moves on along it. Arguments as above."""
         position = [p + v * age_s for p, v in zip(pose.position, pose.velocity, strict=True)]
         self._distance_m = self._path.advanced_m(self._distance_m, position)
         here = self._path.at(self._distance_m)
@@ -121,7 +125,7 @@ class Follower:
         gain = max(-self._config.acceleration_mps2, min(self._config.acceleration_mps2, gain))
         turn_soon = self._path.at(self._distance_m + speed * YAW_LOOK_S).yaw_rate_radpm
         level = math.hypot(here.tangent[0], here.tangent[1])
-        reference = Reference(
+        return Reference(
             position_m=here.position_m,
             velocity_mps=_scaled(here.tangent, speed),
             acceleration_mps2=_sum(
@@ -132,7 +136,24 @@ class Follower:
             yaw_acceleration_radps2=speed * (turn_soon - here.yaw_rate_radpm) / YAW_LOOK_S,
             along=(here.tangent[0] / level, here.tangent[1] / level) if level > 0.1 else (0.0, 0.0),
         )
-        return self._controller.sticks(pose, age_s, reference, dt_s)
+
+    def places(self, times_s: Array) -> tuple[Array, Array]:
+        """Where it will be at times from now, (N, 3) in m, and how fast, (N, 3) in m/s, if all
+        goes as planned.
+        """
+        distance_m, now_s = self._distance_m, 0.0
+        places = np.empty((len(times_s), 3))
+        speeds = np.empty((len(times_s), 3))
+        speed = self._speed_mps
+        for row, time_s in enumerate(times_s.tolist()):
+            gain = self._config.acceleration_mps2 * (time_s - now_s)
+            speed = min(speed + gain, self._speed_at(distance_m))
+            distance_m += speed * (time_s - now_s)
+            now_s = time_s
+            there = self._path.at(distance_m)
+            places[row] = there.position_m
+            speeds[row] = _scaled(there.tangent, speed)
+        return places, speeds
 
     def _speed_at(self, distance_m: float) -> float:
         within = distance_m % self._path.length_m if self._path.closed else distance_m

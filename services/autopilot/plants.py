@@ -49,9 +49,9 @@ def _plant(name: str, plane: tuple[float, float], up_ps: float, yaw_ps: float) -
 
 PLANTS: dict[str, Plant] = {
     # tum_simulator a020d89. Its speed loop 5, 1 over its tilt loop 10, 5 has the transfer function
-    # (25 s + 50) / (s3 + 10 s2 + 45 s + 50), whose inverse is 1 + 0.4 s to second order; 0.05 s is
-    # the filter of the tilt. Climb: 5 / (1 + 1); yaw: 2.
-    "tum": _plant("tum", (2.5, 0.05), 2.5, 2.0),
+    # (25 s + 50) / (s3 + 10 s2 + 45 s + 50), whose inverse is 1 + 0.4 s to second order:
+    # a rate of 2.5 and no delay. Climb: 5 / (1 + 1); yaw: 2.
+    "tum": _plant("tum", (2.5, 0.0), 2.5, 2.0),
     # tum_ardrone 6bcfb34: the speed follows the tilt with c1, the tilt the stick with c3; c7, c5.
     "ardrone": _plant("ardrone", (0.58, 1.0 / 7.0), 0.8, 25.0),
 }
