@@ -184,26 +184,3 @@ def at_rate(times_s: Array, values: Array, rate_hz: float = MODEL_RATE_HZ) -> Ar
     count = math.floor(duration_s * rate_hz + 1e-6) + 1
     grid_s = times_s[0] + np.arange(count) / rate_hz
     return np.stack([np.interp(grid_s, times_s, values[:, k]) for k in range(values.shape[1])], 1)
-
-
-def in_start_frame(times_s: Array, sticks: Array, full_stick_yaw_radps: float) -> Array:
-    """Sticks turned into the frame of the heading at the first one.
-
-    An operator who flies a curve by forward and yaw holds the stick still; only in a frame that
-    does not turn with the vehicle is that an arc.
-
-    Args:
-        times_s: (N,) of the sticks.
-        sticks: (N, 4) vx vy vz wz in the heading frame.
-        full_stick_yaw_radps: the yaw rate of full stick.
-
-    Returns:
-        (N, 3) vx vy vz.
-    """
-    steps_s = np.diff(times_s, prepend=times_s[:1])
-    # The stick is held until the next one comes, so a step turns by the stick at its beginning.
-    held = np.concatenate([[0.0], sticks[:-1, 3]])
-    yaw = full_stick_yaw_radps * np.cumsum(held * steps_s)
-    c, s = np.cos(yaw), np.sin(yaw)
-    vx, vy = sticks[:, 0], sticks[:, 1]
-    return np.stack([c * vx - s * vy, s * vx + c * vy, sticks[:, 2]], axis=1)
