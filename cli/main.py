@@ -19,7 +19,7 @@ COMMANDS = {
     "alive": "whether a service runs, by the exit code",
     "doctor": "what is installed, reachable and alive, and what to do about what is not",
     "record": "what flies, into an MCAP file",
-    "dataset": "labelled sticks: import, record, generate, stats, check",
+    "dataset": "labelled sticks: import, record, generate, stats, check, split",
     "worlds": "the places to fly in, and pictures of them",
     "contract": "print the wire contract, made from the code",
     "train": "make the model that recognises primitives, and its card",

@@ -19,6 +19,7 @@ COMMANDS = {
     "generate": ("generate", "make a set by simulated operators"),
     "stats": ("stats", "counts, lengths and rates of sets, and their length histograms"),
     "check": ("check", "say what is wrong with sets, row by row"),
+    "split": ("split", "deal the operators of a set to training, validation and test"),
 }
 """Each with its module, whose name may not be Python's."""
 

@@ -211,7 +211,7 @@ def _run(options: argparse.Namespace) -> int:
             raise OSError(f"{options.out} is there already; choose another --out, or --append")
         before = open_set(options.out)
         provenance = before.provenance
-        primitives = [before.primitive(row) for row in range(len(before))]
+        primitives = before.primitives()
     table = Table("file", *CLASSES, "problems", box=None, padding=(0, 2, 0, 0))
     console = Console(stderr=True)
     taken = 0

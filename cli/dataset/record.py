@@ -74,7 +74,7 @@ class _Set:
         self._provenance: dict[str, str] = {"made": "record"}
         if path.exists():
             stored = open_set(path)
-            self._primitives = [stored.primitive(row) for row in range(len(stored))]
+            self._primitives = stored.primitives()
             self._provenance = stored.provenance
 
     def take(self, event: "Event") -> str:

@@ -3,12 +3,13 @@
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from common.sticks import DEAD_BAND
 from training.dataset.primitive import Primitive
-from training.dataset.store import DatasetError, Stored
+from training.dataset.store import DatasetError, Stored, open_set
 from training.dataset.track import BEYOND
 from training.labels import NONE
 
@@ -63,6 +64,25 @@ def check_stored(stored: Stored) -> list[Finding]:
         findings.append(Finding(None, "there is no primitive in it; record or import some"))
     findings += check(primitives, rows)
     return sorted(findings, key=lambda each: len(stored) if each.row is None else each.row)
+
+
+def load_sound(path: Path) -> tuple[list[Primitive], list[Finding]]:
+    """The primitives of a file that nothing is wrong with, and what is wrong with the others.
+
+    Raises:
+        DatasetError: if it is no data set, or nothing of it is sound.
+        OSError: if it cannot be read.
+    """
+    stored = open_set(path)
+    findings = check_stored(stored)
+    faulty = {finding.row for finding in findings}
+    sound = [stored.primitive(row) for row in range(len(stored)) if row not in faulty]
+    if not sound:
+        raise DatasetError(
+            f"{path}: none of its {len(stored)} primitives can be used;"
+            f" 'autocomplete dataset check {path}' tells why"
+        )
+    return sound, findings
 
 
 def _faults(p: Primitive) -> list[str]:

@@ -51,6 +51,14 @@ class Stored:
         """How many primitives there are."""
         return len(self.arrays["label"])
 
+    def primitives(self) -> list[Primitive]:
+        """All of them.
+
+        Raises:
+            DatasetError: if the label of one is unknown.
+        """
+        return [self.primitive(row) for row in range(len(self))]
+
     def primitive(self, row: int) -> Primitive:
         """The primitive of a row.
 
@@ -121,8 +129,7 @@ def load(path: Path) -> list[Primitive]:
         DatasetError: if it is none, is cut off, or holds a label that is not known.
         OSError: if it cannot be read.
     """
-    stored = open_set(path)
-    return [stored.primitive(row) for row in range(len(stored))]
+    return open_set(path).primitives()
 
 
 def open_set(path: Path) -> Stored:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from dataset_samples import circle, primitive
 
-from training.dataset.check import check, check_stored
+from training.dataset.check import check, check_stored, load_sound
 from training.dataset.primitive import Primitive
-from training.dataset.store import open_set, save
+from training.dataset.store import DatasetError, open_set, save
 
 TIMES_S = np.arange(150) / 50.0
 
@@ -103,5 +103,9 @@ def test_rows_of_a_file_keep_their_numbers(tmp_path: Path) -> None:
         "row 1: label 'spiral' is unknown; use line, arc, sine, helix, none",
         "row 3: arc by ana: the same sticks as row 2; keep one",
     ]
+    sound, told = load_sound(path)
+    assert [len(sound), len(told)] == [2, 2]
     save(path, [])
     assert "there is no primitive" in str(check_stored(open_set(path))[0])
+    with pytest.raises(DatasetError, match="none of its 0 primitives can be used"):
+        load_sound(path)

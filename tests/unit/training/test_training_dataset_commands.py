@@ -129,6 +129,17 @@ def test_stats_count_and_draw(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert dataset("stats", figure) == 1
 
 
+def test_split_deals_whole_operators(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.npz"
+    save(path, [primitive(operator=f"p{number % 5}") for number in range(10)])
+    assert dataset("split", path) == 0
+    parts = [load(tmp_path / f"a.{name}.npz") for name in ("train", "validation", "test")]
+    assert [len(part) for part in parts] == [6, 2, 2]
+    save(path, [primitive()])
+    assert dataset("split", path) == 2
+    assert "1 operators are too few" in capsys.readouterr().err
+
+
 def test_generate_makes_the_same_set_for_the_same_seed(tmp_path: Path) -> None:
     small = ("--operators", 3, "--multiple", 0.004, "--none", 3, "--seed", 7)
     for name in ("a.npz", "b.npz"):
@@ -146,7 +157,7 @@ def test_generate_makes_the_population_of_the_thesis(tmp_path: Path) -> None:
     assert {p.source for p in load(out)} == {"generator thesis seed 0"}
 
 
-@pytest.mark.parametrize("command", ["import", "record", "generate", "stats", "check"])
+@pytest.mark.parametrize("command", ["import", "record", "generate", "stats", "check", "split"])
 def test_help_teaches_by_examples(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as exit_:
         dataset(command, "--help")

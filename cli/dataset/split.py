@@ -1,0 +1,34 @@
+"""`autocomplete dataset split`: whole operators to training, validation and test."""
+
+import argparse
+
+from cli import options as opts
+from cli.dataset import shared
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument("file", metavar="FILE.npz", type=opts.existing_file)
+    parser.add_argument("--seed", type=opts.seed, default=0, help="same seed, same split (0)")
+    parser.description = (
+        "Writes FILE.train.npz, FILE.validation.npz and FILE.test.npz, which share no operator:"
+        " 20 % of the operators to test, 16 % to validate, the rest to train."
+    )
+    opts.add_examples(parser, "autocomplete dataset split all.npz --seed 1")
+    parser.set_defaults(action=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    with shared.training_installed():
+        from training.dataset.split import split_by_operator
+        from training.dataset.store import open_set, save
+    stored = open_set(options.file)
+    split = split_by_operator(stored.primitives(), options.seed)
+    before = stored.provenance.get("made", "")
+    made = "; ".join(filter(None, [before, f"split {options.file} --seed {options.seed}"]))
+    for name, part in vars(split).items():
+        path = options.file.with_suffix(f".{name}.npz")
+        save(path, part, {**stored.provenance, "made": made})
+        operators = len({p.operator for p in part})
+        print(f"{path}: {len(part)} primitives by {operators} operators")
+    return 0
