@@ -68,17 +68,27 @@ def held(wanted: Array, people: People) -> Array:
     return out
 
 
-def shaken(sticks: Array, people: People, rng: np.random.Generator) -> Array:
-    """Sticks (n, k, 4) with tremor on the axes in use, and noise in proportion to the push."""
+def noisy(sticks: Array, people: People, rng: np.random.Generator) -> Array:
+    """Sticks (n, k, 4) with noise in proportion to the push."""
     n, count = sticks.shape[:2]
+    noise = np.stack([slow(n, count, 0.12, rng) for _ in range(4)], axis=2)
+    return np.asarray(sticks * (1.0 + people.signal_noise[:, None, None] * noise))
+
+
+def shaken(sticks: Array, people: People, rng: np.random.Generator) -> Array:
+    """Sticks (n, k, 4) with tremor on the axes in use."""
     used = np.abs(sticks).max(axis=1) > 0.05
     shaken = sticks.copy()
     for axis in range(4):
-        noise = people.signal_noise[:, None] * slow(n, count, 0.12, rng)
-        shake = tremor(people.tremor_hz, count, rng) * people.tremor[:, None] / 0.87
-        shaken[:, :, axis] *= 1.0 + noise
-        shaken[:, :, axis] += np.where(used[:, axis, None], shake, 0.0)
+        rows = np.flatnonzero(used[:, axis])
+        shake = tremor(people.tremor_hz[rows], sticks.shape[1], rng)
+        shaken[rows, :, axis] += shake * people.tremor[rows, None]
     return shaken
+
+
+def finished(wanted: Array, people: People, rng: np.random.Generator) -> Array:
+    """What hands make of pushes (n, k, 4) that are wanted: held, late, noisy, trembling."""
+    return shaken(noisy(neuromuscular(held(wanted, people), people), people, rng), people, rng)
 
 
 def alive(sticks: Array, dead_band: Array) -> Array:
@@ -142,7 +152,7 @@ def draw(
     wanted = np.stack([vx, vy, climb, turn], axis=2) * taps(people, count, rng)[:, :, None]
     released = released_at(samples, people, rng)
     wanted, samples = lead_out(wanted, samples, released, people)
-    return shaken(neuromuscular(held(wanted, people), people), people, rng), samples
+    return finished(wanted, people, rng), samples
 
 
 def released_at(

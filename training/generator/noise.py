@@ -10,15 +10,25 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 STEP_S = 0.02
+POINTS_PER_CONSTANT = 4.0
+TREMOR_DEVIATION = math.sqrt(0.5 * (1.0 + 0.5**2) + 0.5**2)
 
 
 def slow(rows: int, count: int, time_constant_s: float, rng: np.random.Generator) -> Array:
-    """(rows, count) coloured noise of standard deviation 1 over its own length, at `STEP_S`."""
-    sigma = time_constant_s / STEP_S
+    """(rows, count) coloured noise of standard deviation about 1, at `STEP_S`."""
+    # Drawn at a few points per time constant, and joined by lines: much cheaper than at each step.
+    every = max(1, int(time_constant_s / STEP_S / POINTS_PER_CONSTANT))
+    sigma = time_constant_s / STEP_S / every
     pad = int(3 * sigma) + 1
-    white = rng.standard_normal((rows, count + 2 * pad))
-    smooth = gaussian_filter1d(white, sigma, axis=1, truncate=3.0)[:, pad : pad + count]
-    return np.asarray(smooth * math.sqrt(2.0 * math.sqrt(math.pi) * sigma))
+    coarse = (count - 1) // every + 2
+    white = rng.standard_normal((rows, coarse + 2 * pad))
+    smooth = gaussian_filter1d(white, sigma, axis=1, truncate=3.0)[:, pad : pad + coarse]
+    smooth *= math.sqrt(2.0 * math.sqrt(math.pi) * sigma)
+    if every == 1:
+        return np.asarray(smooth[:, :count])
+    at, between = np.divmod(np.arange(count), every)
+    share = between / every
+    return np.asarray(smooth[:, at] * (1.0 - share) + smooth[:, at + 1] * share)
 
 
 def wander(rows: int, count: int, rng: np.random.Generator) -> Array:
@@ -34,7 +44,8 @@ def tremor(frequency_hz: Array, count: int, rng: np.random.Generator) -> Array:
     phase = 2.0 * math.pi * STEP_S * frequency_hz[:, None] * np.arange(count)
     phase += rng.uniform(0.0, 2.0 * math.pi, (rows, 1)) + 0.8 * slow(rows, count, 0.1, rng)
     strength = 1.0 + 0.5 * slow(rows, count, 0.3, rng)
-    return np.asarray(strength * np.sin(phase) + 0.5 * rng.standard_normal((rows, count)))
+    shake = strength * np.sin(phase) + 0.5 * rng.standard_normal((rows, count))
+    return np.asarray(shake / TREMOR_DEVIATION)
 
 
 def pulses(

@@ -9,8 +9,7 @@ from training.generator.hands import (
     FULL_UP_MPS,
     FULL_YAW_RADPS,
     alive,
-    held,
-    neuromuscular,
+    finished,
     shaken,
     stepped,
     taps,
@@ -56,7 +55,7 @@ def turn(people: People, count: int, rng: np.random.Generator) -> Array:
     ramp = np.clip(np.arange(count) * STEP_S / people.ramp_s[:, None], 0.0, 1.0)
     wanted = np.stack([leak, leak * rng.normal(0.0, 1.0, (n, 1)), nudges, yaw * ramp], axis=2)
     wanted *= taps(people, count, rng)[:, :, None]
-    return shaken(neuromuscular(held(wanted, people), people), people, rng)
+    return finished(wanted, people, rng)
 
 
 def free(people: People, count: int, rng: np.random.Generator) -> Array:
@@ -83,7 +82,7 @@ def free(people: People, count: int, rng: np.random.Generator) -> Array:
     turns = (rng.random(n) < 0.3 + 0.6 * people.yaw)[:, None]
     yaw = np.where(turns, pulses(np.full(n, 0.8), count, (0.3, 1.5), 0.6, rng), 0.0)
     wanted = np.stack([vx, vy, up, yaw], axis=2) * taps(people, count, rng)[:, :, None]
-    return shaken(neuromuscular(held(wanted, people), people), people, rng)
+    return finished(wanted, people, rng)
 
 
 def hover(people: People, count: int, offset: Array, rng: np.random.Generator) -> Array:

@@ -89,6 +89,8 @@ def looks_like(label: str, path_m: Array, vertical: Mask, plane_rad: Array) -> M
     way_m = np.linalg.norm(np.diff(path_m, axis=1), axis=2).sum(axis=1)
     flat_way_m = np.maximum(np.linalg.norm(np.diff(flat, axis=1), axis=2).sum(axis=1), 1e-6)
     far_enough = way_m > SHORTEST_M
+    left, right = _turns(flat)
+    most, least = np.maximum(left, right), np.minimum(left, right)
     if label == "line":
         away = path_m - path_m[:, :1]
         chord_m = np.maximum(np.linalg.norm(away[:, -1], axis=1), 1e-6)
@@ -96,10 +98,11 @@ def looks_like(label: str, path_m: Array, vertical: Mask, plane_rad: Array) -> M
         off = away - (away @ ahead[:, :, None]) * ahead[:, None]
         off_m = np.linalg.norm(off, axis=2)
         return np.asarray(
-            far_enough & (off_m.max(axis=1) < STRAIGHT_SHARE * chord_m) & (chord_m > 0.9 * way_m)
+            far_enough
+            & (off_m.max(axis=1) < STRAIGHT_SHARE * chord_m)
+            & (chord_m > 0.9 * way_m)
+            & (least < SWING_RAD)
         )
-    left, right = _turns(flat)
-    most, least = np.maximum(left, right), np.minimum(left, right)
     rise = np.abs(out_of_plane[:, -1] - out_of_plane[:, 0]) / flat_way_m
     if label == "sine":
         # It must get on while it swings: else it is a knot.

@@ -173,8 +173,7 @@ def test_shapes_well_done_are_called_by_their_name_and_no_other(label: str) -> N
     level = np.zeros(200, dtype=bool)
     for other in PRIMITIVES:
         called = observer.looks_like(other, seen, level, np.zeros(200)).mean()
-        # A fifth of a helix' climbs are slight, and a bit of a sine is an arc.
-        assert called > 0.75 if other == label else called < 0.1
+        assert called > 0.95 if other == label else called < 0.02
 
 
 def test_thesis_lengths_are_those_of_its_histograms(thesis: list[Primitive]) -> None:
