@@ -7,6 +7,8 @@ from common.messages import Command, Stick
 
 DEAD_BAND = 0.05
 """Deflections up to this are neutral (rpg_quadrotor_control's manual_flight_assistant)."""
+END_BUTTON = "end"
+"""A stick's button for the end of a primitive, where hands have no face buttons."""
 
 
 @dataclass(frozen=True)

@@ -79,12 +79,16 @@ class _Set:
 
     def take(self, event: "Event") -> str:
         """Do what a press of the button asks for; what to tell the person."""
+        from training.dataset.check import check
+
         if event.verdict == "refused":
             return f"[yellow]not taken[/]: {event.reason}"
         if event.primitive is not None:
             self._primitives.append(event.primitive)
             self.taken += 1
             text = f"{self._label} of {event.primitive.duration_s:.1f} s"
+            faults = "; ".join(finding.text for finding in check([event.primitive]))
+            text += f", [yellow]{faults}[/]" if faults else ""
         elif self.taken:
             self._primitives.pop()
             self.taken -= 1

@@ -4,6 +4,7 @@ import os
 
 from common.config import ConfigError
 from common.messages import DecideAction
+from common.sticks import END_BUTTON
 from services.operator.sources import Deflection, Reading
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
@@ -31,6 +32,9 @@ DECISIONS: dict[str, DecideAction] = {
     "delete": "emergency",
 }
 
+END = "e"
+"""Ends a primitive while data is collected."""
+
 FULL = 0.8
 """What a held key commands in the end."""
 RISE_PER_S = 4.0
@@ -39,7 +43,7 @@ RISE_PER_S = 4.0
 HELP = (
     "W S A D   forward back left right",
     "arrows   up down, turn left right",
-    "Enter accept    Esc cancel",
+    "Enter accept    Esc cancel    E end of primitive",
     "T take off   L land   Del emergency",
 )
 NO_SCREEN = {"dummy", "offscreen"}
@@ -63,6 +67,7 @@ class Keys:
             self._axes[index] = sign * min(grown, FULL)
         return Reading(
             Deflection(*self._axes),
+            buttons=(END_BUTTON,) if END in held else (),
             decisions=frozenset(DECISIONS[key] for key in held & DECISIONS.keys()),
         )
 

@@ -4,6 +4,7 @@ from common import messages as m
 from common.bus import QueryFailedError
 from common.config import ConfigError
 from common.node import Node, RefusedError
+from common.sticks import END_BUTTON
 from common.topics import alive_key_of
 from services.overlay import protocol
 from services.overlay.config import Config
@@ -12,8 +13,6 @@ from services.overlay.core import Overlay
 from services.overlay.lease import PadLease, Standing
 
 STICK_PERIOD_S = 0.02
-END_BUTTON = "end"
-"""What the page's end of a primitive is called among a stick's buttons."""
 AGES_SHOWN = ("camera/front", "pose", "stick", "autopilot", "vehicle")
 
 

@@ -21,6 +21,12 @@ def test_a_held_key_deflects_its_axis_more_and_more() -> None:
     assert deflections[-1] == FULL
 
 
+def test_a_key_ends_a_primitive() -> None:
+    board = Keys()
+    assert board.step({"w", "e"}, 0.02).buttons == ("end",)
+    assert board.step({"w"}, 0.02).buttons == ()
+
+
 def test_opposite_keys_cancel_and_turning_round_starts_from_neutral() -> None:
     board = Keys()
     for _ in range(20):
