@@ -1,0 +1,185 @@
+"""Folds keep people apart; verdicts say what is met; the report is written from any results."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from common.clock import ManualClock, nanoseconds
+from services.classifier.model import Answer
+from training.dataset.primitive import Primitive
+from training.evaluation import folds
+from training.evaluation.bars import at_least, at_most, bars
+from training.evaluation.contenders import CONTENDERS, contender
+from training.evaluation.distortions import DISTORTIONS
+from training.evaluation.folds import SEEDS, Size, fold
+from training.evaluation.hover import bothered
+from training.evaluation.latency import latency
+from training.evaluation.measures import Tally
+from training.evaluation.names import CALIBRATED, FAMILY, KNOWN, MOMENTS, OURS
+from training.evaluation.report import write
+from training.evaluation.results import Results
+from training.generator.people import FAMILIES
+from training.labels import NONE, PRIMITIVES
+
+TINY = Size(24, 0.02, 16, 0.02, 0.25, 8, 0.01, 1, 500)
+
+
+def quiet(_done: int, _of: int) -> None:
+    pass
+
+
+def populate(population, operators: int, counts: dict[str, int], seed: int) -> list[Primitive]:
+    """As the generator's, without people in it."""
+    members = [population.families[k % len(population.families)].name for k in range(operators)]
+    times_s = np.arange(90) / 45.0
+    return [
+        Primitive(
+            times_s,
+            np.full((90, 4), 0.3),
+            label,
+            f"{members[turn % operators]}-{turn % operators}",
+            members[turn % operators],
+            f"{population.name} {seed}",
+        )
+        for label, count in counts.items()
+        for turn in range(count)
+    ]
+
+
+def test_no_person_is_learned_from_and_judged_on_and_left_out_families_are_unseen(
+    monkeypatch,
+) -> None:
+    monkeypatch.setattr(folds, "populate", populate)
+    made = fold(1, TINY, quiet)
+    learned = {p.operator for p in made.lesson.training}
+    chosen = {p.operator for p in made.lesson.validation}
+    judged = {p.operator for people in made.tests.values() for p in people}
+    assert not learned & chosen
+    assert not (learned | chosen) & judged
+    assert made.left_out
+    seen = {p.family for p in (*made.lesson.training, *made.lesson.validation)}
+    assert not seen & set(made.left_out)
+    assert {p.family for p in made.tests[CALIBRATED]} <= seen
+    assert NONE in {p.label for p in made.lesson.training}
+    assert made.lesson.windows.labels.max() < len(PRIMITIVES)
+
+
+def test_each_family_is_left_out_of_one_seed() -> None:
+    out = [family.name for seed in range(SEEDS) for family in FAMILIES[seed::SEEDS]]
+    assert sorted(out) == sorted(family.name for family in FAMILIES)
+
+
+def test_every_classifier_has_the_name_it_is_asked_for_by() -> None:
+    pytest.importorskip("aeon")
+    assert [contender(name).name for name in CONTENDERS] == list(CONTENDERS)
+    with pytest.raises(ValueError, match="unknown; use cnn-gru"):
+        contender("nobody")
+
+
+class Stub:
+    """A model that always says the same."""
+
+    name = "stub"
+    labels = PRIMITIVES
+    confidence_min = 0.5
+
+    def __init__(self, meant: float, ask: Callable[[], None] = lambda: None) -> None:
+        self._meant = meant
+        self._ask = ask
+
+    def answer(self, sticks: np.ndarray, full_yaw_radps: float) -> Answer:
+        self._ask()
+        return Answer(np.array([0.97, 0.01, 0.01, 0.01]), self._meant)
+
+
+def pushing(seconds: float) -> Primitive:
+    times_s = np.arange(round(seconds * 50)) / 50.0
+    sticks = np.tile([0.4, 0.0, 0.0, 0.0], (len(times_s), 1))
+    return Primitive(times_s, sticks, NONE, "o", "f", "test")
+
+
+def test_suggestions_are_counted_through_the_classifiers_own_core() -> None:
+    sure = bothered(Stub(1.0), [pushing(10.0)] * 2, 1.0)
+    assert (sure.people, sure.bothered) == (2, 2)
+    assert sure.suggestions == sure.asked == 2 * 9
+    assert bothered(Stub(0.1), [pushing(10.0)], 1.0).suggestions == 0
+
+
+def test_latency_is_that_of_single_windows() -> None:
+    clock = ManualClock()
+    found = latency(Stub(1.0, lambda: clock.advance(0.001)), clock, 50)
+    assert found.p50_s == pytest.approx(0.001)
+    assert found.p99_s == pytest.approx(0.001)
+    assert nanoseconds(found.p50_s) == 1_000_000
+
+
+def test_verdicts_say_by_how_much_a_bar_is_missed() -> None:
+    assert at_least(0.97, 0.97) == "met"
+    assert at_least(0.95, 0.97) == "short by 0.020"
+    assert at_most(3.1, 2.0, 1) == "short by 1.1"
+
+
+def result(right: float, families: list[str]) -> dict:
+    def counts(share: float) -> dict:
+        swapped = round(100 * (1.0 - share))
+        confusion = np.diag([100 - swapped] * 4) + np.roll(np.diag([swapped] * 4), 1, axis=1)
+        bins = np.zeros((15, 3))
+        bins[12] = 400, 400 * share, 400 * share
+        return Tally(confusion, bins).to_json()
+
+    names = [CALIBRATED, KNOWN, *(FAMILY + family for family in families)]
+    return {
+        "fit_s": 1.0,
+        "sets": {name: {moment: counts(right) for moment in MOMENTS} for name in names},
+        "distorted": {name: counts(right - 0.01) for name in DISTORTIONS},
+        "history": [(1.0, 1.1), (0.5, 0.6)],
+        "none": {"": {"auroc": 0.98, "n": 800}},
+        "hover": {
+            period: {"people": 20, "asked": 1200, "suggestions": 0, "bothered": 0}
+            for period in ("1.0", "0.1")
+        },
+    }
+
+
+def results(ours: float, peer: float) -> Results:
+    judged = {
+        name: {0: result(right, ["calm"]), 1: result(right, ["wild"])}
+        for name, right in ((OURS, ours), ("svm", peer), ("cnn-gru-thesis", 0.5))
+    }
+    human = {"GunPoint": {0: {"ours": 0.99, "padded": 0.98, "stretched": 0.97, "n": 150.0}}}
+    return Results(judged, human, {"LITETime": "too slow"}, {}, (0.80, 0.81))
+
+
+def test_a_bar_is_met_only_above_every_peer() -> None:
+    verdicts = {bar.question: bar.verdict for bar in bars(results(0.98, 0.99))}
+    assert verdicts["F1, calibrated people held out"] == "not met: 0.010 below the best peer"
+    assert verdicts["F1, family left out: wild"] == "not met: 0.010 below the best peer"
+    assert verdicts["none against the four, AUROC"] == "met"
+    assert verdicts["people: GunPoint, accuracy"] == "met"
+    verdicts = {bar.question: bar.verdict for bar in bars(results(0.98, 0.90))}
+    assert verdicts["F1, calibrated people held out"] == "met"
+    verdicts = {bar.question: bar.verdict for bar in bars(results(0.92, 0.95))}
+    assert verdicts["F1, family left out: calm"] == "short by 0.010, 0.030 below the best peer"
+
+
+def test_the_report_is_markdown_html_and_pictures(tmp_path) -> None:
+    write(results(0.98, 0.90), tmp_path)
+    text = (tmp_path / "report.md").read_text()
+    assert "| F1, calibrated people held out | >= 0.97, above every peer |" in text
+    assert "not run: too slow" in text
+    page = (tmp_path / "report.html").read_text()
+    assert '<td class="met">met</td>' in page
+    pictures = {path.name for path in tmp_path.glob("*.png")}
+    assert {"bars.png", "early.png", "reliability.png", "confusion.png", "losses.png"} <= pictures
+    for name in pictures:
+        assert f"]({name})" in text
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_report_needs_no_network_of_ours(tmp_path) -> None:
+    found = results(0.98, 0.90)
+    del found.judged[OURS]
+    assert [table.title for table in write(found, tmp_path)][1] == (
+        "Classifiers, at the end of a primitive"
+    )

@@ -1,0 +1,1 @@
+"""Evaluation: every classifier on the same people, windows and questions, against its bars."""

@@ -1,0 +1,267 @@
+"""Against each bar: what was found, whether it is met, and by how much it is missed."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from training.evaluation.distortions import UNCHANGED
+from training.evaluation.human import HUMAN_SETS
+from training.evaluation.measures import Estimate, Tally, estimate
+from training.evaluation.names import CALIBRATED, FAMILY, MOMENTS, OURS, WHOLE
+from training.evaluation.results import Results, pooled
+
+CALIBRATED_F1 = 0.97
+ARC_SINE = 0.03
+FAMILY_F1 = 0.93
+EARLY_F1 = {"1.0 s": 0.70, "1.5 s": 0.80, "2.0 s": 0.88, "3.0 s": 0.93}
+CALIBRATION_ERROR = 0.03
+NONE_AUROC = 0.97
+ROBUST_POINTS = 2.0
+P50_S, P99_S = 0.2e-3, 0.3e-3
+
+
+@dataclass(frozen=True)
+class Bar:
+    """One demand and what became of it.
+
+    Attributes:
+        question: what is asked.
+        bar: what it should be.
+        found: ours.
+        peer: the best of the others, where they can be asked.
+        verdict: "met", or by how much it is missed.
+    """
+
+    question: str
+    bar: str
+    found: str
+    peer: str
+    verdict: str
+
+
+def at_least(found: float, bar: float, digits: int = 3) -> str:
+    """Met, or short by how much."""
+    return "met" if found >= bar else f"short by {bar - found:.{digits}f}"
+
+
+def at_most(found: float, bar: float, digits: int = 3) -> str:
+    """Met, or over by how much."""
+    return "met" if found <= bar else f"short by {found - bar:.{digits}f}"
+
+
+def _best(values: dict[str, Estimate]) -> tuple[str, float]:
+    """The best peer and what it reaches."""
+    if not values:
+        return "-", float("-inf")
+    name = max(values, key=lambda name: values[name].mean)
+    return f"{name} {values[name].text()}", values[name].mean
+
+
+def _above(found: float, bar: float, peer: float) -> str:
+    """The verdict where a bar is to be met and every peer beaten."""
+    verdict = at_least(found, bar)
+    if found > peer:
+        return verdict
+    behind = f"{peer - found:.3f} below the best peer"
+    return f"not met: {behind}" if verdict == "met" else f"{verdict}, {behind}"
+
+
+def _calibrated(results: Results) -> list[Bar]:
+    found = results.f1(OURS, CALIBRATED)
+    text, peer = _best({name: results.f1(name, CALIBRATED) for name in results.peers})
+    swapped = {
+        name: estimate(t.arc_sine for t in results.tallies(name, CALIBRATED, WHOLE))
+        for name in results.models
+    }
+    least = min(results.peers, key=lambda name: swapped[name].mean, default=None)
+    return [
+        Bar(
+            "F1, calibrated people held out",
+            f">= {CALIBRATED_F1}, above every peer",
+            found.text(),
+            text,
+            _above(found.mean, CALIBRATED_F1, peer),
+        ),
+        Bar(
+            "arcs and sines taken for each other",
+            f"<= {ARC_SINE:.0%}",
+            f"{swapped[OURS].text(1, 100)} %",
+            "-" if least is None else f"{least} {swapped[least].text(1, 100)} %",
+            at_most(swapped[OURS].mean, ARC_SINE),
+        ),
+    ]
+
+
+def _families(results: Results) -> list[Bar]:
+    rows = []
+    for family in results.families:
+        found = results.f1(OURS, FAMILY + family)
+        peers = {name: results.f1(name, FAMILY + family) for name in results.peers}
+        text, peer = _best(peers)
+        verdict = _above(found.mean, FAMILY_F1, peer)
+        rows.append(
+            Bar(
+                f"F1, family left out: {family}",
+                f">= {FAMILY_F1}, above every peer",
+                found.text(),
+                text,
+                verdict,
+            )
+        )
+    return rows
+
+
+def _early(results: Results) -> list[Bar]:
+    rows = []
+    for moment, bar in EARLY_F1.items():
+        found = results.f1(OURS, CALIBRATED, moment)
+        text, peer = _best({name: results.f1(name, CALIBRATED, moment) for name in results.peers})
+        rows.append(
+            Bar(
+                f"F1 after {moment}, calibrated people",
+                f">= {bar:.2f}, above every peer",
+                found.text(),
+                text,
+                _above(found.mean, bar, peer),
+            )
+        )
+    return rows
+
+
+def calibration(results: Results, model: str, people: str) -> Estimate:
+    """Expected calibration error at all moments together, over seeds.
+
+    Args:
+        results: of the evaluation.
+        model: a classifier with probabilities.
+        people: how the names of the sets begin that are counted.
+    """
+    errors = []
+    for result in results.judged[model].values():
+        names = [name for name in result["sets"] if name.startswith(people)]
+        error = pooled(result, names, tuple(MOMENTS)).calibration_error
+        if error is not None:
+            errors.append(error)
+    return estimate(errors)
+
+
+def _trust(results: Results) -> list[Bar]:
+    rows = []
+    for people, text in ((CALIBRATED, "calibrated people"), (FAMILY, "families left out")):
+        error = calibration(results, OURS, people)
+        rows.append(
+            Bar(
+                f"expected calibration error, {text}",
+                f"<= {CALIBRATION_ERROR}",
+                error.text(),
+                "-",
+                at_most(error.mean, CALIBRATION_ERROR),
+            )
+        )
+    auroc = results.each(OURS, lambda result: result["none"][""]["auroc"])
+    rows.append(
+        Bar(
+            "none against the four, AUROC",
+            f">= {NONE_AUROC}",
+            auroc.text(),
+            "-",
+            at_least(auroc.mean, NONE_AUROC),
+        )
+    )
+    for period in ("1.0", "0.1"):
+        holds = [result["hover"][period] for result in results.judged[OURS].values()]
+        people, asked, given, bothered = (
+            sum(hold[key] for hold in holds)
+            for key in ("people", "asked", "suggestions", "bothered")
+        )
+        rows.append(
+            Bar(
+                f"suggestions in 60 s of hover corrections, T = {float(period):g} s",
+                "none",
+                f"{given} of {asked} answers; {bothered} of {people} people",
+                "-",
+                "met" if given == 0 else f"short by {given} in {people} min",
+            )
+        )
+    return rows
+
+
+def points_lost(results: Results, model: str, distortion: str) -> Estimate:
+    """By how many points of F1 a distortion makes a classifier worse."""
+
+    def lost(result: dict[str, Any]) -> float:
+        changed = result["distorted"]
+        before, after = (Tally.from_json(changed[name]).f1 for name in (UNCHANGED, distortion))
+        return 100.0 * (before - after)
+
+    return results.each(model, lost)
+
+
+def _robust(results: Results) -> list[Bar]:
+    first = next(iter(results.judged[OURS].values()))
+    rows = []
+    for name in (name for name in first["distorted"] if name != UNCHANGED):
+        lost = points_lost(results, OURS, name)
+        peers = {peer: points_lost(results, peer, name) for peer in results.peers}
+        least = min(peers, key=lambda peer: peers[peer].mean, default=None)
+        rows.append(
+            Bar(
+                f"F1 lost with {name}",
+                f"<= {ROBUST_POINTS:g} points",
+                lost.text(1),
+                "-" if least is None else f"{least} {peers[least].text(1)}",
+                at_most(lost.mean, ROBUST_POINTS, 1),
+            )
+        )
+    return rows
+
+
+def _human(results: Results) -> list[Bar]:
+    rows = []
+    for human in HUMAN_SETS:
+        seeds = results.human.get(human.name)
+        if not seeds:
+            continue
+        found = estimate(seed["ours"] for seed in seeds.values())
+        peer = max(
+            (estimate(seed[kind] for seed in seeds.values()) for kind in ("padded", "stretched")),
+            key=lambda one: one.mean,
+        )
+        published = human.published.recurrent
+        bar = max(peer.mean, published or 0.0)
+        rows.append(
+            Bar(
+                f"people: {human.name}, accuracy",
+                f">= {bar:.3f}: " + ("published" if bar == published else "MiniRocket"),
+                found.text(),
+                f"MiniRocket {peer.text()}",
+                at_least(found.mean, bar),
+            )
+        )
+    return rows
+
+
+def _speed(results: Results) -> list[Bar]:
+    if not results.latency:
+        return []
+    rows = []
+    for name, key, bar in (("p50", "p50_s", P50_S), ("p99", "p99_s", P99_S)):
+        found = results.latency[key]
+        rows.append(
+            Bar(
+                f"one window of 4 s, one thread, {name}, ms",
+                f"<= {bar * 1e3:g}",
+                f"{found * 1e3:.2f}",
+                "-",
+                at_most(found * 1e3, bar * 1e3, 2),
+            )
+        )
+    return rows
+
+
+def bars(results: Results) -> list[Bar]:
+    """Every demand in order; only those on people if our network has not been run."""
+    rows: list[Bar] = []
+    if OURS in results.judged:
+        for part in (_calibrated, _families, _early, _trust, _robust):
+            rows += part(results)
+    return rows + _human(results) + _speed(results)
