@@ -38,17 +38,19 @@ class Population:
         difficulty: how far people are from the textbook: scales habits of bad execution and the
             scatter of shapes.
         compass_share: those who set out in one of eight directions.
+        yaws: whether anybody touches the yaw axis.
     """
 
     name: str
     families: tuple[Family, ...]
     difficulty: float = 1.0
     compass_share: float = COMPASS_SHARE
+    yaws: bool = True
 
 
 THESIS_DIFFICULTY = 2.0
 """Found by `training.generator.calibration`."""
-THESIS = Population("thesis", THESIS_FAMILIES, THESIS_DIFFICULTY, compass_share=0.85)
+THESIS = Population("thesis", THESIS_FAMILIES, THESIS_DIFFICULTY, compass_share=0.85, yaws=False)
 """The calibrated population: on its sticks the thesis' machine scores as in the thesis."""
 
 
@@ -148,13 +150,16 @@ def attempt(
     label: str, style: Style, people: People, population: Population, rng: np.random.Generator
 ) -> tuple[list[Messages], NDArray[np.bool_]]:
     """One try of each of these people, and whether an observer and the thesis' filters take it."""
-    offset = worn_offset(people, rng)
+    used = np.array([1.0, 1.0, 1.0, float(population.yaws)])
+    offset = worn_offset(people, rng) * used
     if label == NONE:
         sticks, samples, good = _nothing(people, offset, rng)
+        sticks *= used
     else:
         shapes = ask(label, people, style, rng, population.difficulty, population.compass_share)
         if style is Style.HAND:
             sticks, samples = hands.draw(shapes, people, rng)
+            sticks *= used
             where_m = _flown_m(sticks, offset, people)
         else:
             sticks, samples, where_m = pilots.fly(shapes, people, offset, rng)
