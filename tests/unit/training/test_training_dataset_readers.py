@@ -275,3 +275,27 @@ def test_rest_is_no_primitive(tmp_path: Path) -> None:
     reading = read_file(path, Rules())
     assert not reading.primitives
     assert not reading.problems
+
+
+@pytest.mark.parametrize("file_format", [*WRITERS, "vectors"])
+def test_damage_anywhere_is_told_in_lines_and_never_crashes(
+    tmp_path: Path, file_format: str
+) -> None:
+    path = tmp_path / "a"
+    if file_format == "vectors":
+        write_vectors(path, [(circle(60), 1)] * 5)
+    else:
+        WRITERS[file_format](path, performed((circle(60), "cross")))
+    whole = path.read_bytes()
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        damaged = bytearray(whole)
+        for place in rng.integers(0, len(whole) - 30, 3):
+            damaged[place] = rng.choice(list(b'09,.-[]{}"\n :e\x00\xffai&*!|'))
+            del damaged[place + 1 : place + 1 + int(rng.integers(0, 5))]
+        path.write_bytes(damaged)
+        try:
+            problems = read_file(path, Rules()).problems
+        except DatasetError:
+            continue
+        assert not any("\n" in str(problem) for problem in problems)
