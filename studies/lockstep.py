@@ -17,8 +17,9 @@ from services.classifier.core import Classifier
 from services.localizer.core import Localizer
 from services.operator.pilot import Decision, Pilot
 from services.operator.sources import Deflection
+from services.sim.cameras import Shot, cameras_of
 from services.sim.config import Config as SimConfig
-from services.sim.core import PHYSICS_HZ, Shot, Simulation, cameras_of
+from services.sim.core import PHYSICS_HZ, Simulation
 from services.sim.studio import open_renderer, photograph
 from services.synthesis.core import Synthesizer
 

@@ -7,6 +7,9 @@ import worlds
 from common.messages import Plant
 from services.sim.plants import PLANTS
 
+FrontSize = Literal["360p", "480p", "720p"]
+FrontLens = Literal["tum", "ardrone", "measured"]
+
 
 @dataclass(frozen=True)
 class Config:
@@ -42,22 +45,19 @@ class Config:
     """Scale of the sensors' noise; 0 is none."""
     renderer: Literal["auto", "gl", "tiny", "none"] = "auto"
     """What draws the pictures; auto is gl where there is OpenGL, else pybullet's TinyRenderer."""
-    front_width: int = 640
-    """Pixels."""
-    front_height: int = 360
-    """Pixels."""
+    front_size: FrontSize = "360p"
+    """640x360; 480p is 640x480, 720p 1280x720."""
+    front_lens: FrontLens = "tum"
+    """tum: a pinhole of 81 deg across, as tum_simulator's. ardrone: 73.5 deg, as the drone's maker
+    states it. measured: a real one with its distortion."""
     front_fps: float = 30.0
     """Pictures a second, at most 200."""
-    front_view_deg: float = 81.0
-    """Horizontal field of view; 81 deg is tum_simulator's."""
-    down_width: int = 320
-    """Pixels."""
-    down_height: int = 240
-    """Pixels."""
     down_fps: float = 60.0
-    """Pictures a second, at most 200."""
-    down_view_deg: float = 53.13
-    """Horizontal field of view; the AR.Drone's lens has about 64 deg along the diagonal."""
+    """Pictures a second, at most 200; they are 320x240."""
+    exposure_s: float = 0.0
+    """How long a shutter stays open, which smears what moves; a picture is then drawn 5 times."""
+    picture_noise: float = 0.0
+    """Scale of the noise of pixels and exposure; 0 is none."""
     jpeg_quality: int = 80
     """Of the pictures, 1 to 100."""
 
@@ -70,7 +70,7 @@ class Config:
             raise ValueError(f"plant: no {self.plant!r}; there are {', '.join(PLANTS)}")
         if self.seed < 0:
             raise ValueError("seed: must be 0 or more")
-        for name in ("command_noise", "sensor_noise"):
+        for name in ("command_noise", "sensor_noise", "picture_noise"):
             if not 0.0 <= getattr(self, name) <= 10.0:
                 raise ValueError(f"{name}: must lie in 0..10")
         if not 0.0 <= self.wind_mps <= 20.0:
@@ -84,14 +84,10 @@ class Config:
         for name in ("command_delay_s", "sensor_delay_s", "video_delay_s"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name}: must lie in 0..1")
-        for name in ("front_width", "front_height", "down_width", "down_height"):
-            if not 16 <= getattr(self, name) <= 4096:
-                raise ValueError(f"{name}: must lie in 16..4096 pixels")
         for name in ("front_fps", "down_fps"):
             if not 0.0 < getattr(self, name) <= 200.0:
                 raise ValueError(f"{name}: must lie above 0 and not above 200")
-        for name in ("front_view_deg", "down_view_deg"):
-            if not 1.0 <= getattr(self, name) <= 150.0:
-                raise ValueError(f"{name}: must lie in 1..150 deg")
+        if not 0.0 <= self.exposure_s <= 0.05:
+            raise ValueError("exposure_s: must lie in 0..0.05")
         if not 1 <= self.jpeg_quality <= 100:
             raise ValueError("jpeg_quality: must lie in 1..100")

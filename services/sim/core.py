@@ -5,18 +5,17 @@ The same seed and the same commands at the same steps give the same messages.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import msgspec
 import numpy as np
 
 import worlds
 from common import messages as m
-from common.camera import DOWN, FRONT, Lens, Mount
 from common.clock import NS_PER_S
 from common.topics import TOPICS
 from services.sim import sensors
 from services.sim.body import CALM, REST_HEIGHT_M, BodyState, Quaternion, Vector3
+from services.sim.cameras import Shot, cameras_of
 from services.sim.config import Config
 from services.sim.delay import Delay
 from services.sim.plants import PLANTS
@@ -36,37 +35,6 @@ MAX_HEIGHT_M = 100.0
 IN_THE_AIR_M = 0.1
 """A vehicle that starts this far above what is below it starts flying."""
 
-VIDEO_TOPICS = ("camera/front", "camera/down")
-
-
-@dataclass(frozen=True)
-class Camera:
-    """A camera of the vehicle.
-
-    Attributes:
-        topic: where its pictures go.
-        lens: its size and projection.
-        mount: its place in the body.
-        fps: pictures a second.
-        near_m: it sees nothing nearer; the nearer, the less it tells far things apart.
-    """
-
-    topic: str
-    lens: Lens
-    mount: Mount
-    fps: float
-    near_m: float = 0.08
-
-
-@dataclass(frozen=True, slots=True)
-class Shot:
-    """A picture to be taken: by which camera, when, and where the body is then."""
-
-    topic: str
-    stamp_ns: int
-    position_m: Vector3
-    orientation: Quaternion
-
 
 class Step(msgspec.Struct, frozen=True, gc=False):
     """What one step brought: messages by topic, and pictures to take."""
@@ -81,19 +49,6 @@ class ResetError(ValueError):
     def __init__(self, field: str, text: str) -> None:
         super().__init__(text)
         self.field = field
-
-
-def cameras_of(config: Config) -> tuple[Camera, ...]:
-    """The vehicle's cameras."""
-    front = Lens.of_view(
-        config.front_width, config.front_height, math.radians(config.front_view_deg)
-    )
-    down = Lens.of_view(config.down_width, config.down_height, math.radians(config.down_view_deg))
-    return (
-        Camera("camera/front", front, FRONT, config.front_fps),
-        # On the ground it is 25 mm above it.
-        Camera("camera/down", down, DOWN, config.down_fps, near_m=0.01),
-    )
 
 
 class _Shutter:
@@ -342,7 +297,14 @@ class Simulation:
         left = 1.0 - share
         position_m = (left * x0 + share * x1, left * y0 + share * y1, left * z0 + share * z1)
         turn = quaternion_between(was.orientation, now.orientation, share)
-        return Shot(shutter.topic, stamp_ns, position_m, turn)
+        return Shot(
+            shutter.topic,
+            stamp_ns,
+            position_m,
+            turn,
+            now.velocity_mps,
+            now.angular_velocity_radps,
+        )
 
 
 def _steps(duration_s: float) -> int:

@@ -7,10 +7,11 @@ import numpy as np
 
 from common.camera import Lens, Mount, project, to_optical
 from common.frames import Array, quaternion_of, rotation_of
-from services.sim.core import STEP_S, Camera, Shot
+from services.sim.cameras import Camera, Shot
+from services.sim.core import STEP_S
+from services.sim.optics import Renderer
 from services.sim.shaders import HAZE, HAZE_PER_M
 from services.sim.stage import Stage
-from services.sim.studio import Renderer
 from services.sim.textures import Picture
 from worlds import World
 

@@ -16,7 +16,7 @@ import numpy as np
 from common.camera import Lens
 from common.frames import Array, rotation_of
 from services.sim import meshes, shaders
-from services.sim.core import Camera, Shot
+from services.sim.cameras import Camera, Shot
 from services.sim.stage import Scene
 from services.sim.textures import PIXELS, Picture, paint, patches, sky
 from worlds import Body, Texture

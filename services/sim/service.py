@@ -5,8 +5,9 @@ from collections import deque
 from common import messages as m
 from common.clock import seconds
 from common.node import Node, RefusedError
+from services.sim.cameras import VIDEO_TOPICS, cameras_of
 from services.sim.config import Config
-from services.sim.core import PHYSICS_HZ, VIDEO_TOPICS, ResetError, Simulation, cameras_of
+from services.sim.core import PHYSICS_HZ, ResetError, Simulation
 from services.sim.pace import Pace
 from services.sim.studio import Studio
 from services.sim.vehicle import WATCHDOG_S

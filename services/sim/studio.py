@@ -4,40 +4,19 @@ import logging
 import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import Literal, Protocol
+from typing import Literal
 
 import cv2
 
 from common import messages as m
-from services.sim.core import Camera, Shot
+from services.sim.cameras import Camera, Shot
+from services.sim.optics import Renderer, picture_of
 from services.sim.renderer import GlRenderer, NoOpenGlError, jpeg_of
 from services.sim.stage import Scene
-from services.sim.textures import Picture
 
 log = logging.getLogger(__name__)
 
 Choice = Literal["auto", "gl", "tiny", "none"]
-
-
-class Renderer(Protocol):
-    """Draws pictures of a scene."""
-
-    @property
-    def name(self) -> str:
-        """What draws, for people."""
-        ...
-
-    def load(self, scene: Scene) -> None:
-        """Draw this scene from now on."""
-        ...
-
-    def draw(self, camera: Camera, shot: Shot) -> Picture:
-        """The picture (height, width, 3) in BGR."""
-        ...
-
-    def close(self) -> None:
-        """Free everything."""
-        ...
 
 
 def open_renderer(choice: Choice) -> Renderer:
@@ -66,7 +45,7 @@ def photograph(renderer: Renderer, camera: Camera, shot: Shot, quality: int) -> 
         width=camera.lens.width,
         height=camera.lens.height,
         format="jpeg",
-        data=jpeg_of(renderer.draw(camera, shot), quality),
+        data=jpeg_of(picture_of(renderer, camera, shot), quality),
         intrinsics=camera.lens.intrinsics,
         distortion=camera.lens.distortion,
         capture=shot.stamp_ns,

@@ -9,7 +9,7 @@ import numpy as np
 import pybullet
 
 from common.camera import Lens
-from services.sim.core import Camera, Shot
+from services.sim.cameras import Camera, Shot
 from services.sim.renderer import FAR_M, view_of
 from services.sim.stage import Scene, add_visible
 from services.sim.textures import Picture, paint

@@ -11,10 +11,10 @@ import pytest
 
 from common.camera import DOWN, FRONT, Lens, Mount, project, to_optical
 from common.frames import quaternion_of, rotation_of
-from services.sim.core import Camera, Shot
+from services.sim.cameras import Camera, Shot
+from services.sim.optics import Renderer
 from services.sim.renderer import GlRenderer, NoOpenGlError, jpeg_of
 from services.sim.stage import Scene, Stage
-from services.sim.studio import Renderer
 from services.sim.tiny import TinyRenderer
 from worlds import Body, Texture, World, load
 

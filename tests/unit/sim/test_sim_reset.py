@@ -59,8 +59,10 @@ def test_a_bad_request_is_refused_and_the_flight_goes_on(
         {"seed": -1},
         {"sensor_noise": -0.1},
         {"front_fps": 0.0},
-        {"down_width": 5},
-        {"front_view_deg": 180.0},
+        {"exposure_s": 1.0},
+        {"wind_mps": 50.0},
+        {"battery": 0.0},
+        {"command_delay_s": 2.0},
         {"jpeg_quality": 0},
     ],
 )

@@ -9,9 +9,18 @@ from common.messages import Imu, Pose, Range, ResetRequest
 from services.sim.body import GRAVITY_MPS2, Sticks
 from services.sim.sensors import (
     ACCELERATION_NOISE_MPS2,
+    BIAS_TIME_S,
+    DROPOUT,
     MAGNETIC_BIAS,
     MAGNETIC_FIELD,
+    RANGE_MAX_M,
+    RANGE_NOISE_M,
+    RATE_BIAS_RADPS,
     RATE_NOISE_RADPS,
+    Altimeter,
+)
+from services.sim.sensors import (
+    Imu as Gyro,
 )
 
 
@@ -85,3 +94,53 @@ def test_truth_is_the_motion_itself() -> None:
     assert pose.velocity == states[-1].velocity_mps
     assert pose.angular_velocity[2] == pytest.approx(states[-1].angular_velocity_radps[2], rel=0.01)
     assert pose.source == "truth"
+
+
+def test_over_an_edge_the_altimeter_jumps_before_the_vehicle_is_there() -> None:
+    # A crate 1.2 m wide and high stands at x 11.2.
+    simulation = hovering(world="track")
+    jumped_m = []
+    for x in np.arange(9.4, 11.0, 0.1):
+        simulation.reset(ResetRequest(position=(float(x), 3.6, 2.2)))
+        _, messages = fly(simulation, 0.05)
+        range_m = next(m.range for _, m in messages if isinstance(m, Range))
+        if range_m < 1.6:
+            jumped_m.append(x)
+    edge_m = 11.2 - 0.6
+    # The rim of the cone is 20 deg off: what is 1.6 m away on it is 0.55 m ahead.
+    assert edge_m - 0.6 < jumped_m[0] < edge_m - 0.1
+    assert jumped_m == sorted(jumped_m)
+
+
+def test_the_altimeter_hears_the_floor_not_the_slant_when_it_tilts() -> None:
+    simulation = hovering(plant="ardrone", height_m=2.0)
+    states, messages = fly(simulation, 1.0, Sticks(vx=1.0))
+    assert states[-1].tilt_rad > 0.2
+    range_m = [m for _, m in messages if isinstance(m, Range)][-1].range
+    assert range_m == pytest.approx(states[-1].position_m[2], rel=0.002)
+
+
+def test_the_altimeters_noise_and_dropouts_are_as_stated() -> None:
+    altimeter = Altimeter(np.random.default_rng(2), 1.0)
+    ranges_m = np.asarray([altimeter.sample(0, 1.0).range for _ in range(20_000)])
+    lost = ranges_m == RANGE_MAX_M
+    assert lost.mean() == pytest.approx(DROPOUT, rel=0.2)
+    assert ranges_m[~lost].std() == pytest.approx(RANGE_NOISE_M, rel=0.05)
+
+
+def test_offsets_wander_over_minutes_around_their_stated_size() -> None:
+    still = hovering().state
+    ends: list[tuple[float, ...]] = []
+    for seed in range(60):
+        imu = Gyro(np.random.default_rng(seed), 1.0, 0.005)
+        first = np.mean([imu.sample(0, still).angular_velocity for _ in range(2_000)], axis=0)
+        ends.append(tuple(first))
+    # The mean of 2000 samples leaves 0.0001 of the white noise.
+    assert np.std(ends) == pytest.approx(RATE_BIAS_RADPS, rel=0.2)
+    imu = Gyro(np.random.default_rng(1), 1.0, 0.5)
+    walk = np.asarray([imu.sample(0, still).angular_velocity for _ in range(60_000)])
+    slow = walk.reshape(-1, 100, 3).mean(axis=1)
+    assert slow.std() == pytest.approx(RATE_BIAS_RADPS, rel=0.3)
+    lag = round(BIAS_TIME_S / 50.0)
+    correlation = np.mean(slow[:-lag] * slow[lag:]) / np.mean(slow * slow)
+    assert correlation == pytest.approx(np.exp(-1.0), abs=0.25)

@@ -7,8 +7,8 @@ import pytest
 
 from common.messages import Image, Message
 from services.sim import studio
+from services.sim.cameras import Camera, Shot, cameras_of
 from services.sim.config import Config
-from services.sim.core import Camera, Shot, cameras_of
 from services.sim.renderer import NoOpenGlError
 from services.sim.stage import Scene
 from services.sim.textures import Picture

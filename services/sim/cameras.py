@@ -1,0 +1,93 @@
+"""The vehicle's cameras, their lenses, and the pictures that they are asked for."""
+
+import math
+from dataclasses import dataclass
+
+from common.camera import DOWN, FRONT, Lens, Mount
+from services.sim.body import Quaternion, Vector3
+from services.sim.config import Config, FrontLens, FrontSize
+
+VIDEO_TOPICS = ("camera/front", "camera/down")
+
+SIZES: dict[FrontSize, tuple[int, int]] = {
+    "360p": (640, 360),
+    "480p": (640, 480),
+    "720p": (1280, 720),
+}
+_VIEWS_RAD: dict[FrontLens, float] = {
+    "tum": math.radians(81.0),
+    # As its maker states them, 73.5 x 58.5 deg, of a sensor of 4:3: at 16:9 it is 45.6 deg down.
+    "ardrone": math.radians(73.5),
+}
+_MEASURED = Lens(640, 360, (569.9, 568.0, 331.4, 135.9), (-0.527, 0.274, 0.0, 0.0))
+"""A real AR.Drone's front camera as ardrone_autonomy ships its calibration."""
+_DOWN = Lens.of_view(320, 240, math.radians(53.13))
+"""About 64 deg along the diagonal, as the AR.Drone's."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera of the vehicle.
+
+    Attributes:
+        topic: where its pictures go.
+        lens: its size and projection.
+        mount: its place in the body.
+        fps: pictures a second.
+        near_m: it sees nothing nearer; the nearer, the less it tells far things apart.
+        exposure_s: how long the shutter is open: what moves meanwhile is smeared.
+        noise: scale of a picture's noise.
+        seed: of that noise.
+    """
+
+    topic: str
+    lens: Lens
+    mount: Mount
+    fps: float
+    near_m: float = 0.08
+    exposure_s: float = 0.0
+    noise: float = 0.0
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A picture to be taken: by which camera, when, and where the body is then.
+
+    Attributes:
+        topic: the camera's.
+        stamp_ns: when the shutter closes.
+        position_m: of the body, world.
+        orientation: body to world, [x, y, z, w].
+        velocity_mps: world.
+        angular_velocity_radps: world.
+    """
+
+    topic: str
+    stamp_ns: int
+    position_m: Vector3
+    orientation: Quaternion
+    velocity_mps: Vector3 = (0.0, 0.0, 0.0)
+    angular_velocity_radps: Vector3 = (0.0, 0.0, 0.0)
+
+
+def cameras_of(config: Config) -> tuple[Camera, Camera]:
+    """The vehicle's cameras, front and down."""
+    eyes = (config.exposure_s, config.picture_noise, config.seed)
+    return (
+        Camera("camera/front", front_lens(config), FRONT, config.front_fps, 0.08, *eyes),
+        # On the ground it is 25 mm above it.
+        Camera("camera/down", _DOWN, DOWN, config.down_fps, 0.01, *eyes),
+    )
+
+
+def front_lens(config: Config) -> Lens:
+    """The front camera's lens at the size that is set."""
+    width, height = SIZES[config.front_size]
+    if config.front_lens != "measured":
+        return Lens.of_view(width, height, _VIEWS_RAD[config.front_lens])
+    scale = width / _MEASURED.width
+    fx, fy, cx, cy = (scale * each for each in _MEASURED.intrinsics)
+    # The taller picture of the same width shows more above and below.
+    cy += (height - scale * _MEASURED.height) / 2.0
+    return Lens(width, height, (fx, fy, cx, cy), _MEASURED.distortion)
