@@ -1,7 +1,7 @@
 """Any file of sticks as labelled primitives: format found, cut, labelled, kept to length."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
@@ -37,7 +37,7 @@ class Rules:
 
     Attributes:
         axes: which stick each of the file's axes is; None: as the original data set has them.
-        operator: who performed; None: the file's name.
+        operator: who performed; None: the file's name, or as a set says.
         family: what kind of people that is.
         label: of everything in the files; None: by button, or as the file says.
         buttons: the label that each button stands for.
@@ -161,10 +161,19 @@ def _from_set(path: Path, rules: Rules) -> tuple[list[Primitive], list[Problem]]
     primitives, problems = [], []
     for row in range(len(stored)):
         try:
-            primitives.append(stored.primitive(row))
+            primitive = stored.primitive(row)
         except DatasetError as error:
             text = str(error).removeprefix(f"{path}: row {row}: ")
             problems.append(Problem(str(path), f"row {row}", f"{text}; it is left out"))
+        else:
+            primitives.append(
+                replace(
+                    primitive,
+                    label=rules.label or primitive.label,
+                    operator=rules.operator or primitive.operator,
+                    family=rules.family or primitive.family,
+                )
+            )
     return primitives, problems
 
 

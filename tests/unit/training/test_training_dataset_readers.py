@@ -235,6 +235,8 @@ def test_sets_are_read_too(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     save(path, [primitive(), primitive(operator="ben")])
     assert [p.operator for p in read_file(path, Rules()).primitives] == ["ana", "ben"]
+    renamed = read_file(path, Rules(operator="eve", label="sine")).primitives
+    assert [(p.operator, p.label) for p in renamed] == [("eve", "sine")] * 2
 
 
 def test_what_no_button_labels_is_left_out_unless_the_label_is_given(tmp_path: Path) -> None:
