@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --disable-pip-version-check -c constraints.t
 SCRIPTS := .ci/run deploy/install
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo up check test test-compose bench flight properties train evaluate picture lock docs format clean
+.PHONY: help setup demo up check test test-compose bench fits flight properties train evaluate picture lock docs format clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -70,6 +70,9 @@ test: setup $(VENV)/.all ## every test that is not slow, in under 15 minutes on 
 test-compose: setup $(VENV)/.all ## the mission in containers; needs Docker
 	$(BIN)/python -m pytest tests/system/test_compose.py -m slow -s $(ARGS)
 
+fits: setup $(VENV)/.all ## fits of hidden shapes beside an oracle, their errors and times
+	$(BIN)/python tests/performance/fits.py $(ARGS)
+
 bench: setup $(VENV)/.all ## rates and latencies of the whole chain, as a table
 	$(BIN)/python tests/performance/bench.py $(ARGS)
 
@@ -101,6 +104,7 @@ lock: $(BIN)/python ## renew constraints.txt to the newest versions that fit pyp
 
 docs: setup ## the pages that are made from the code
 	$(BIN)/autocomplete contract > docs/contract.md
+	$(BIN)/python -m services.autopilot.diagram docs/autopilot.md
 
 format: $(VENV)/.all ## put the code into its format
 	$(BIN)/ruff check --fix .

@@ -187,8 +187,13 @@ def fit_circle(points_m: Array) -> Circle:
         off = residuals(np.array([*centre, radius]))
         errors = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
         centre_std, radius_std = errors[:2], float(errors[2])
-    angles = np.unwrap(np.arctan2(y - centre[1], x - centre[0]))
-    return Circle(centre, radius, centre_std, radius_std, angles, off)
+    return Circle(centre, radius, centre_std, radius_std, angles_about(centre, points_m), off)
+
+
+def angles_about(centre_m: Array, points_m: Array) -> Array:
+    """Angles (N,) of points (N, 2) about a centre (2,), without jumps."""
+    x, y = (points_m - centre_m).T
+    return np.asarray(np.unwrap(np.arctan2(y, x)))
 
 
 def angles_ahead(start_rad: float, sense: float, half_turn_m: float, half_turns: int) -> Array:
@@ -198,12 +203,14 @@ def angles_ahead(start_rad: float, sense: float, half_turn_m: float, half_turns:
     return np.asarray(start_rad + sense * ways)
 
 
-def example_circle(rng: np.random.Generator, sweep_rad: float) -> tuple[dict[str, float], Array]:
+def example_circle(
+    rng: np.random.Generator, sweep_rad: float, count: int
+) -> tuple[dict[str, float], Array]:
     """A random circle's parameters, and angles (N,) in rad around it, either way."""
     cx, cy = rng.uniform(-10.0, 10.0, 2)
     radius = math.exp(rng.uniform(math.log(0.6), math.log(6.0)))
     begin, sense = rng.uniform(-math.pi, math.pi), rng.choice((-1.0, 1.0))
-    angles = begin + sense * np.linspace(0.0, sweep_rad, EXAMPLE_POINTS)
+    angles = begin + sense * np.linspace(0.0, sweep_rad, count)
     return {"cx": cx, "cy": cy, "radius": radius}, angles
 
 
@@ -265,9 +272,11 @@ class Arc(Shape):
         return self.circle.tolerances
 
     @classmethod
-    def example(cls, rng: np.random.Generator, extent: float) -> Example:
+    def example(
+        cls, rng: np.random.Generator, extent: float, count: int = EXAMPLE_POINTS
+    ) -> Example:
         """Any circle, either way round; `extent` in rad."""
-        params, angles = example_circle(rng, extent)
+        params, angles = example_circle(rng, extent, count)
         z = rng.uniform(1.0, 3.0)
         points = np.column_stack([on_circle(params, angles), np.full(len(angles), z)])
         return Example(

@@ -15,12 +15,20 @@ from services.synthesis.config import Config
 from services.synthesis.primitives.arc import (
     RMS_SHARE,
     Circle,
+    angles_about,
     angles_ahead,
     example_circle,
     fit_circle,
     on_circle,
 )
-from services.synthesis.primitives.shape import Example, Quality, Shape, UnfitError
+from services.synthesis.primitives.shape import (
+    EXAMPLE_POINTS,
+    Example,
+    Quality,
+    Shape,
+    UnfitError,
+    levenberg_marquardt,
+)
 
 TURNS = 3
 MIN_PITCH_M = 0.1
@@ -56,29 +64,22 @@ class Helix(Shape):
 
     @classmethod
     def fit(cls, points_m: Array, start_m: Array) -> Self:
-        """A circle seen from above, and the regression of height on the angle flown."""
+        """The circle seen from above, the pitch by regression, then all five together."""
         circle = fit_circle(points_m[:, :2])
-        turned = circle.sense * circle.angles_rad / (2.0 * math.pi)
-        heights = points_m[:, 2]
-        turned_mean, height_mean = float(turned.mean()), float(heights.mean())
-        centred = turned - turned_mean
-        power = float(centred @ centred)
-        if power <= 1e-12:
+        if circle.swept_rad <= 1e-6:
             raise UnfitError("no part of a turn was flown")
-        pitch = float(centred @ heights) / power
-        off = heights - height_mean - pitch * centred
-        start_rad = circle.angle_of(start_m[:2])
-        start_turned = circle.sense * start_rad / (2.0 * math.pi)
+        circle, height, pitch, height_std, pitch_std = _refined(circle, points_m)
+        turned = circle.sense * circle.angles_rad / (2.0 * math.pi)
+        off = points_m[:, 2] - height - pitch * (turned - turned.mean())
         rms = math.sqrt(float(np.mean(circle.off_m**2) + np.mean(off**2)))
-        sigma = math.sqrt(float(off @ off) / max(len(off) - 2, 1))
-        pitch_std = sigma / math.sqrt(power)
-        since_mean = start_turned - turned_mean
+        start_rad = circle.angle_of(start_m[:2])
+        since_mean = circle.sense * start_rad / (2.0 * math.pi) - float(turned.mean())
         return cls(
             _climbing(circle.quality(rms), pitch, circle.radius_m),
             circle,
             start_rad,
-            height_mean + pitch * since_mean,
-            math.hypot(sigma / math.sqrt(len(off)), pitch_std * since_mean),
+            height + pitch * since_mean,
+            math.hypot(height_std, pitch_std * since_mean),
             pitch,
             pitch_std,
         )
@@ -105,9 +106,11 @@ class Helix(Shape):
         return {**self.circle.tolerances, "pitch": pitch}
 
     @classmethod
-    def example(cls, rng: np.random.Generator, extent: float) -> Example:
+    def example(
+        cls, rng: np.random.Generator, extent: float, count: int = EXAMPLE_POINTS
+    ) -> Example:
         """Any circle, up or down; `extent` in rad."""
-        params, angles = example_circle(rng, extent)
+        params, angles = example_circle(rng, extent, count)
         pitch = rng.choice((-1.0, 1.0)) * rng.uniform(0.3, 2.0)
         heights = rng.uniform(3.0, 6.0) + pitch * np.abs(angles - angles[0]) / (2.0 * math.pi)
         sweep = math.copysign(TURNS * 2.0 * math.pi, angles[-1] - angles[0])
@@ -137,6 +140,49 @@ class Helix(Shape):
         xy = on_circle(circle.params, angles)
         turned = np.abs(angles - self.start_rad) / (2.0 * math.pi)
         return np.column_stack([xy, self.start_height_m + self.pitch_m * turned])
+
+
+def _refined(circle: Circle, points_m: Array) -> tuple[Circle, float, float, float, float]:
+    """The circle, the mean height, the pitch, and both their errors, by all three coordinates."""
+    x, y, z = points_m.T
+    scale = circle.sense / (2.0 * math.pi)
+    count = len(z)
+
+    def residuals(helix: Array) -> Array:
+        cx, cy, radius, height, pitch = helix
+        turned = scale * angles_about(helix[:2], points_m[:, :2])
+        climb = height + pitch * (turned - turned.mean())
+        return np.concatenate([np.hypot(x - cx, y - cy) - radius, z - climb])
+
+    def jacobian(helix: Array) -> Array:
+        dx, dy = helix[0] - x, helix[1] - y
+        distance = np.maximum(np.hypot(dx, dy), 1e-9)
+        turned = scale * angles_about(helix[:2], points_m[:, :2])
+        slopes = np.zeros((5, 2 * count))
+        slopes[0, :count], slopes[1, :count] = dx / distance, dy / distance
+        slopes[2, :count] = -1.0
+        for row, turn in ((0, -dy / distance**2), (1, dx / distance**2)):
+            slopes[row, count:] = -helix[4] * scale * (turn - turn.mean())
+        slopes[3, count:] = -1.0
+        slopes[4, count:] = turned.mean() - turned
+        return slopes
+
+    turned = scale * circle.angles_rad
+    turned = turned - turned.mean()
+    pitch = float(turned @ z) / float(turned @ turned)
+    start = np.array([*circle.centre_m, circle.radius_m, z.mean(), pitch])
+    helix, covariance, _ = levenberg_marquardt(residuals, jacobian, start)
+    errors = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
+    centre, radius = helix[:2], abs(float(helix[2]))
+    refined = Circle(
+        centre,
+        radius,
+        errors[:2],
+        float(errors[2]),
+        angles_about(centre, points_m[:, :2]),
+        np.hypot(x - centre[0], y - centre[1]) - radius,
+    )
+    return refined, float(helix[3]), float(helix[4]), float(errors[3]), float(errors[4])
 
 
 def _climbing(level: Quality, pitch_m: float, radius_m: float) -> Quality:

@@ -26,10 +26,10 @@ from services.synthesis.primitives.shape import (
 AHEAD_M = 20.0
 HALF_SECTOR_RAD = math.pi / 8.0
 """A line's direction is told by eight sectors; its error is judged as a share of half a one."""
-LEVEL_CLIMB_RAD = math.radians(5.0)
-"""Climbs up to this are not meant: a stick inside the dead band gives 1.4 at full speed."""
-VERTICAL_CLIMB_RAD = math.radians(80.0)
-"""Above this it is a straight climb: hands off, a drone drifts by a tenth of its climbing speed."""
+LEVEL_CLIMB_RAD = math.radians(2.5)
+"""Climbs up to this are not meant: a stick inside the dead band gives 1.4 degrees at full speed."""
+VERTICAL_CLIMB_RAD = math.radians(87.5)
+"""Above this it is a straight climb."""
 LEVEL_SHARE = 0.2
 """Level part of a direction below which a heading is not meant: 78 degrees up."""
 RMS_SHARE = 0.1
@@ -130,13 +130,13 @@ class Line(Shape):
         return {"heading": math.pi if steep else HALF_SECTOR_RAD, "climb": HALF_SECTOR_RAD}
 
     @classmethod
-    def example(cls, rng: np.random.Generator, extent: float) -> Example:
+    def example(
+        cls, rng: np.random.Generator, extent: float, count: int = EXAMPLE_POINTS
+    ) -> Example:
         """Any direction; `extent` in m."""
         direction = rng.normal(size=3)
         direction /= np.linalg.norm(direction)
-        points = rng.uniform(-10.0, 10.0, 3) + np.outer(
-            np.linspace(0.0, extent, EXAMPLE_POINTS), direction
-        )
+        points = rng.uniform(-10.0, 10.0, 3) + np.outer(np.linspace(0.0, extent, count), direction)
         (x, y, z), (dx, dy, dz) = points[-1], direction
         heading, climb = math.atan2(dy, dx), math.atan2(dz, math.hypot(dx, dy))
         return Example(points, {"x": x, "y": y, "z": z, "heading": heading, "climb": climb})

@@ -116,8 +116,10 @@ class Shape(ABC):
 
     @classmethod
     @abstractmethod
-    def example(cls, rng: np.random.Generator, extent: float) -> Example:
-        """A random motion of this shape for tests and figures; `extent` as the module says."""
+    def example(
+        cls, rng: np.random.Generator, extent: float, count: int = EXAMPLE_POINTS
+    ) -> Example:
+        """A random motion of this shape for tests and figures; `extent` as its module says."""
 
     @property
     @abstractmethod
@@ -141,6 +143,7 @@ def levenberg_marquardt(
     residuals: Callable[[Array], Array],
     jacobian: Callable[[Array], Array],
     start: Array,
+    tolerance: float = 1e-7,
 ) -> tuple[Array, Array, float]:
     """Minimise a sum of squares by MINPACK's Levenberg-Marquardt.
 
@@ -148,6 +151,7 @@ def levenberg_marquardt(
         residuals: of N points, for P parameters.
         jacobian: derivatives of the residuals, one row a parameter: (P, N).
         start: first guess (P,).
+        tolerance: relative change of parameters and sum at which to stop.
 
     Returns:
         the parameters, their covariance (P, P) if the residuals are independent, and the
@@ -162,8 +166,8 @@ def levenberg_marquardt(
         Dfun=jacobian,
         col_deriv=True,
         full_output=True,
-        xtol=1e-7,
-        ftol=1e-7,
+        xtol=tolerance,
+        ftol=tolerance,
         maxfev=60,
     )
     if inverse is None or not np.all(np.isfinite(solution)):

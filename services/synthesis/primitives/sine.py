@@ -41,6 +41,8 @@ _START_POINTS = 45
 _START_TURNS_RAD = ((0.0,), (math.radians(-30.0), math.radians(30.0)), (math.radians(90.0),))
 """Axes to start from, against the principal one, until the residual is mere noise."""
 _GOOD_START = 1.6
+_START_TOLERANCE = 1e-3
+_MAX_SLOPE = 10.0
 
 
 @dataclass(frozen=True)
@@ -177,12 +179,16 @@ class Sine(Shape):
         }
 
     @classmethod
-    def example(cls, rng: np.random.Generator, extent: float) -> Example:
-        """Any wave in any direction; `extent` in waves."""
-        amplitude, wavelength = rng.uniform(0.2, 0.8), rng.uniform(1.5, 4.0)
+    def example(
+        cls, rng: np.random.Generator, extent: float, count: int = EXAMPLE_POINTS
+    ) -> Example:
+        """Any wave in any direction that can be flown; `extent` in waves."""
+        # Crests of 0.33 m radius at least, as the tightest arcs.
+        amplitude, curvature = rng.uniform(0.2, 0.8), rng.uniform(0.8, 3.0)
+        wavelength = 2.0 * math.pi * math.sqrt(amplitude / curvature)
         heading, phase = rng.uniform(-math.pi, math.pi, 2)
         anchor = np.array([*rng.uniform(-10.0, 10.0, 2), rng.uniform(1.0, 3.0)])
-        along = np.linspace(0.0, extent * wavelength, EXAMPLE_POINTS)
+        along = np.linspace(0.0, extent * wavelength, count)
         across = amplitude * np.sin(2.0 * math.pi * along / wavelength + phase)
         cos, sin = math.cos(heading), math.sin(heading)
         way = np.column_stack(
@@ -275,6 +281,68 @@ def _first_guesses(xy: Array, axis_rad: float) -> list[tuple[float, Array]]:
     return guesses
 
 
+class _Wave:
+    """Residuals of points (N, 2) from a wave, and their derivatives.
+
+    A wave is its axis (rad), offset, sine and cosine amplitudes (m) and wave number (1/m).
+    """
+
+    def __init__(self, xy: Array) -> None:
+        self._x, self._y = xy.T
+        self._key = b""
+        self._parts: tuple[Array, ...] = ()
+
+    def across_it(self, wave: Array) -> Array:
+        """Distances (N,) from the wave, across its axis."""
+        return self._of(wave)[-1]
+
+    def across_slopes(self, wave: Array) -> Array:
+        """Their derivatives (5, N)."""
+        along, across, s, c, _, tilt, _ = self._of(wave)
+        slopes = np.empty((5, len(s)))
+        slopes[0] = -along - wave[4] * tilt * across
+        slopes[1] = -1.0
+        np.negative(s, out=slopes[2])
+        np.negative(c, out=slopes[3])
+        slopes[4] = -along * tilt
+        return slopes
+
+    def off_it(self, wave: Array) -> Array:
+        """Distances (N,) from the wave's tangents."""
+        *_, tilt, off = self._of(wave)
+        return np.asarray(off / np.sqrt(1.0 + (wave[4] * tilt) ** 2))
+
+    def off_slopes(self, wave: Array) -> Array:
+        """Their derivatives (5, N)."""
+        number = wave[4]
+        along, across, s, c, lift, tilt, off = self._of(wave)
+        slope = number * tilt
+        steep = np.sqrt(1.0 + slope**2)
+        bend = -number * lift
+        of_slope = np.empty((5, len(s)))
+        of_slope[0] = number * bend * across
+        of_slope[1] = 0.0
+        of_slope[2] = number * c
+        of_slope[3] = -number * s
+        of_slope[4] = tilt + bend * along
+        return np.asarray((self.across_slopes(wave) - off * slope / steep**2 * of_slope) / steep)
+
+    def _of(self, wave: Array) -> tuple[Array, ...]:
+        # Residuals and derivatives are asked for at the same wave, one after the other.
+        key = wave.tobytes()
+        if key != self._key:
+            axis, offset, sine, cosine, number = wave.tolist()
+            cos, sin = math.cos(axis), math.sin(axis)
+            along = cos * self._x + sin * self._y
+            across = cos * self._y - sin * self._x
+            phase = number * along
+            s, c = np.sin(phase), np.cos(phase)
+            lift, tilt = sine * s + cosine * c, sine * c - cosine * s
+            self._key = key
+            self._parts = along, across, s, c, lift, tilt, across - offset - lift
+        return self._parts
+
+
 def _noise(xy: Array) -> float:
     """Standard deviation of the points' own noise: what neighbours do not share, in m."""
     third = np.diff(xy, n=3, axis=0)
@@ -296,33 +364,7 @@ def _fit_wave(xy: Array) -> tuple[Array, Array]:
     principal = math.atan2(axes[0, 1], axes[0, 0])
     thin = xy[:: max(1, len(xy) // _START_POINTS)]
     noise_m = _noise(xy)
-    x, y = xy.T
-    weight = np.ones(len(x))
-
-    def terms(wave: Array) -> tuple[Array, Array, Array, Array, Array]:
-        cos, sin = math.cos(wave[0]), math.sin(wave[0])
-        along, across = cos * x + sin * y, cos * y - sin * x
-        s, c = np.sin(wave[4] * along), np.cos(wave[4] * along)
-        return along, across, s, c, wave[2] * c - wave[3] * s
-
-    def residuals(wave: Array) -> Array:
-        _, across, s, c, _ = terms(wave)
-        return np.asarray((across - wave[1] - wave[2] * s - wave[3] * c) * weight)
-
-    def jacobian(wave: Array) -> Array:
-        along, across, s, c, tilt = terms(wave)
-        return np.stack(
-            [
-                (-along - wave[4] * tilt * across) * weight,
-                -weight,
-                -s * weight,
-                -c * weight,
-                -along * tilt * weight,
-            ]
-        )
-
-    def slopes(wave: Array) -> Array:
-        return np.asarray(np.hypot(1.0, wave[4] * terms(wave)[4]))
+    model = _Wave(xy)
 
     best: tuple[float, Array] | None = None
     for turns in _START_TURNS_RAD:
@@ -330,10 +372,12 @@ def _fit_wave(xy: Array) -> tuple[Array, Array]:
         guesses.sort(key=lambda guess: guess[0])
         for _, guess in guesses[:2]:
             try:
-                wave, _, _ = levenberg_marquardt(residuals, jacobian, guess)
+                wave, _, _ = levenberg_marquardt(
+                    model.across_it, model.across_slopes, guess, _START_TOLERANCE
+                )
             except UnfitError:
                 continue
-            off_m = math.sqrt(float(np.mean((residuals(wave) / slopes(wave)) ** 2)))
+            off_m = math.sqrt(float(np.mean(model.off_it(wave) ** 2)))
             if wave[4] > 0.0 and (best is None or off_m < best[0]):
                 best = off_m, wave
             if off_m < _GOOD_START * noise_m:
@@ -342,7 +386,9 @@ def _fit_wave(xy: Array) -> tuple[Array, Array]:
             break
     if best is None:
         raise UnfitError("the points do not determine a wave")
-    # Errors lie in both directions: a steep part weighs less, by the distance to its tangent.
-    weight = 1.0 / slopes(best[1])
-    wave, covariance, _ = levenberg_marquardt(residuals, jacobian, best[1])
+    # Errors lie in both directions, so the distance to the wave's tangent counts. Where a wave is
+    # hardly known, that can be made small by mere steepness.
+    wave, covariance, _ = levenberg_marquardt(model.off_it, model.off_slopes, best[1])
+    if wave[4] <= 0.0 or wave[4] * math.hypot(wave[2], wave[3]) > _MAX_SLOPE:
+        raise UnfitError("the points do not determine a wave")
     return wave, covariance

@@ -86,7 +86,7 @@ def test_one_place_is_no_line():
 
 @pytest.mark.parametrize(
     ("climb_deg", "meant_deg"),
-    [(3.0, 0.0), (-4.0, 0.0), (20.0, 20.0), (85.0, 90.0), (-84.0, -90.0)],
+    [(1.5, 0.0), (-2.4, 0.0), (3.0, 3.0), (20.0, 20.0), (88.0, 90.0), (-89.0, -90.0)],
 )
 def test_a_nearly_level_or_vertical_line_is_meant_to_be_one(climb_deg, meant_deg):
     climb = math.radians(climb_deg)
