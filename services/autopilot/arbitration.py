@@ -92,7 +92,7 @@ TABLE: Mapping[tuple[FlightMode, Event], FlightMode | None] = {
 }
 """Every pair of mode and event; the docs' drawing is made from it."""
 
-_ACTIONS: dict[Event, CommandAction] = {
+ACTIONS: dict[Event, CommandAction] = {
     Event.TAKEOFF: "takeoff",
     Event.LAND: "land",
     Event.BATTERY_EMPTY: "land",
@@ -124,7 +124,7 @@ class State:
         mode = TABLE[self.mode, event]
         if mode is None:
             return self
-        action = _ACTIONS.get(event, "fly")
+        action = ACTIONS.get(event, "fly")
         if (mode, action) == (self.mode, self.action) and event is not Event.ACCEPT:
             return self
         return State(mode, event.value, action)

@@ -20,6 +20,8 @@ SPEED_STEPS = 16
 """Speeds that are tried at each place of the path."""
 REPLAN_S = 0.5
 """The speeds are planned anew this often, as the wind becomes known."""
+PLAN_M = 20.0
+"""As far ahead the speeds are planned: room to brake from 3.6 m/s, and until the next plan."""
 SPEED_LEAD_MPS = 0.3
 """The speed asked for is at most this much above the vehicle's own: wind may hold it back."""
 YAW_LOOK_S = 0.2
@@ -77,9 +79,8 @@ class Follower:
             raise BadPathError("too_far")
         along = sum(v * t for v, t in zip(pose.velocity, here.tangent, strict=True))
         self._speed_mps = min(max(along, MIN_SPEED_MPS), suggestion.speed)
-        self._limits_mps = self._limits()
-        self._profile_mps = self._profile()
         self._planned_s = 0.0
+        self._plan_sample, self._plan_mps = self._plan()
 
     @property
     def progress_m(self) -> float:
@@ -110,7 +111,7 @@ class Follower:
         self._planned_s += dt_s
         if self._planned_s >= REPLAN_S:
             self._planned_s = 0.0
-            self._profile_mps = self._profile()
+            self._plan_sample, self._plan_mps = self._plan()
 
         late_s = self._controller.plant.plane.late_s
         before = self._speed_mps
@@ -138,9 +139,7 @@ class Follower:
         )
 
     def places(self, times_s: Array) -> tuple[Array, Array]:
-        """Where it will be at times from now, (N, 3) in m, and how fast, (N, 3) in m/s, if all
-        goes as planned.
-        """
+        """Where it will be at times from now, (N, 3) in m, and how fast, (N, 3) in m/s."""
         distance_m, now_s = self._distance_m, 0.0
         places = np.empty((len(times_s), 3))
         speeds = np.empty((len(times_s), 3))
@@ -156,59 +155,57 @@ class Follower:
         return places, speeds
 
     def _speed_at(self, distance_m: float) -> float:
-        within = distance_m % self._path.length_m if self._path.closed else distance_m
-        index = min(int(within / self._path.spacing_m), len(self._profile_mps) - 1)
-        return float(self._profile_mps[index])
+        index = int(distance_m / self._path.spacing_m) - self._plan_sample
+        return float(self._plan_mps[max(0, min(index, len(self._plan_mps) - 1))])
 
-    def _limits(self) -> Array:
-        """The speed that the path allows at each sample, in m/s: turns, climbs, curves."""
+    def _plan(self) -> tuple[int, Array]:
+        """The first sample planned, and the speeds in m/s from there on."""
         config, path, plant = self._config, self._path, self._controller.plant
+        first = int(self._distance_m / path.spacing_m)
+        last = len(path.points_m) - 1
+        samples = np.arange(first, first + round(PLAN_M / path.spacing_m) + 1)
+        samples = samples % last if path.closed else samples[samples <= last]
+        tangents, curvatures = path.tangents[samples], path.curvatures_1pm[samples]
         share = config.max_speed_fraction
-        rise = np.maximum(np.abs(path.tangents[:, 2]), 1e-6)
-        curvature = np.maximum(np.linalg.norm(path.curvatures_1pm, axis=1), 1e-6)
-        turning = np.maximum(np.abs(path.yaw_rates_radpm), 1e-6)
-        limits: Array = np.min(
-            [
-                np.full(len(rise), self.suggestion.speed),
-                share * min(plant.up.top_speed, plant.down.top_speed) / rise,
-                share * plant.yaw.top_speed / turning,
-                np.sqrt(config.lateral_acceleration_mps2 / curvature),
-            ],
-            axis=0,
-        )
-        return limits
+        rise = np.maximum(np.abs(tangents[:, 2]), 1e-6)
+        curvature = np.maximum(np.linalg.norm(curvatures, axis=1), 1e-6)
+        turning = np.maximum(np.abs(path.yaw_rates_radpm[samples]), 1e-6)
+        limits = [
+            self._manageable_mps(tangents[:, :2], curvatures[:, :2]),
+            share * min(plant.up.top_speed, plant.down.top_speed) / rise,
+            share * plant.yaw.top_speed / turning,
+            np.sqrt(config.lateral_acceleration_mps2 / curvature),
+        ]
+        speeds: Array = np.maximum(np.min(limits, axis=0), MIN_SPEED_MPS)
+        if not path.closed and samples[-1] == last:
+            speeds[-1] = MIN_SPEED_MPS
+        # v squared falls by 2 a a metre at most.
+        fall = 2.0 * config.acceleration_mps2 * path.spacing_m * np.arange(len(speeds))
+        lowest = np.minimum.accumulate((speeds**2 + fall)[::-1])[::-1]
+        return first, np.asarray(np.sqrt(lowest - fall), dtype=np.float64)
 
-    def _profile(self) -> Array:
-        """The speed at each sample, in m/s, that the sticks can keep up in the present wind."""
-        config, path, plane = self._config, self._path, self._controller.plant.plane
-        speeds = np.linspace(MIN_SPEED_MPS, max(self.suggestion.speed, MIN_SPEED_MPS), SPEED_STEPS)
+    def _manageable_mps(self, tangents: Array, curvatures_1pm: Array) -> Array:
+        """The highest speed at each sample, (N,), for which the level sticks suffice in the wind.
+
+        Args:
+            tangents: level parts, (N, 2).
+            curvatures_1pm: the same of the curvature vectors.
+        """
+        plane = self._controller.plant.plane
         wind = np.asarray(self._controller.disturbance.plane_mps2)
+        speeds = np.linspace(MIN_SPEED_MPS, max(self.suggestion.speed, MIN_SPEED_MPS), SPEED_STEPS)
         # The sticks that each speed needs at each sample, as the speed that they ask for.
-        needed = (
-            speeds[:, None, None] * path.tangents[None, :, :2]
-            + (speeds[:, None, None] ** 2 * path.curvatures_1pm[None, :, :2] - wind) / plane.rate_ps
-        )
+        column = speeds[:, None, None]
+        needed = column * tangents + (column**2 * curvatures_1pm - wind) / plane.rate_ps
         needed_mps = np.linalg.norm(needed, axis=2)
-        limit_mps = config.max_speed_fraction * plane.top_speed
+        limit_mps = self._config.max_speed_fraction * plane.top_speed
         # The fastest that can be kept along with all slower ones; the slowest is never refused.
         last = np.maximum(np.cumprod(needed_mps <= limit_mps, axis=0).sum(axis=0), 1) - 1
         after, samples = np.minimum(last + 1, SPEED_STEPS - 1), np.arange(len(last))
         rise = np.maximum(needed_mps[after, samples] - needed_mps[last, samples], 1e-6)
         share = np.clip((limit_mps - needed_mps[last, samples]) / rise, 0.0, 1.0)
-        fastest = speeds[last] + share * (speeds[after] - speeds[last])
-        profile: Array = np.maximum(np.minimum(self._limits_mps, fastest), MIN_SPEED_MPS)
-        if not path.closed:
-            profile[-1] = MIN_SPEED_MPS
-            return self._braked(profile)
-        # Twice round: what comes after the join slows down what is before it.
-        return self._braked(np.concatenate([profile, profile]))[: len(profile)]
-
-    def _braked(self, profile: Array) -> Array:
-        """The profile with room to slow down: v squared falls by 2 a a metre at most."""
-        fall = 2.0 * self._config.acceleration_mps2 * self._path.spacing_m
-        climb = fall * np.arange(len(profile))
-        lowest = np.minimum.accumulate((profile**2 + climb)[::-1])[::-1]
-        return np.asarray(np.sqrt(lowest - climb), dtype=np.float64)
+        fastest: Array = speeds[last] + share * (speeds[after] - speeds[last])
+        return fastest
 
 
 def _scaled(vector: tuple[float, float, float], by: float) -> tuple[float, float, float]:

@@ -121,7 +121,7 @@ def test_the_speed_stays_within_what_the_vehicle_can_do():
         (circle(0.5), math.sqrt(0.5) + 0.01),
         ([(0.0, 0.0, 1.0 + 0.1 * i, 0.0) for i in range(50)], 0.451),
     ):
-        profile = follower_of(path, speed=5.0)._profile_mps
+        profile = follower_of(path, speed=5.0)._plan_mps
         assert profile.max() <= limit
         assert profile[-1] <= 0.15 + 1e-9
 
@@ -129,18 +129,20 @@ def test_the_speed_stays_within_what_the_vehicle_can_do():
 @pytest.mark.parametrize("plant", PLANTS)
 def test_no_speed_is_planned_that_the_wind_forbids(plant):
     follower = follower_of(circle(2.0), speed=1.0, plant=plant, closed=True)
-    calm = follower._profile()
+    _, calm = follower._plan()
     assert calm.max() == pytest.approx(0.9 if plant == "tum" else 1.0, abs=0.03)
     # 80 % of what the sticks can do is spent on a wind from the east.
     plane = PLANTS[plant].plane
     push = 0.8 * plane.rate_ps * plane.top_speed
     follower._controller.disturbance.plane_mps2 = [-push, 0.0]
-    windy = follower._profile()
-    eastward = follower._path.tangents[:, 0]
+    _, windy = follower._plan()
+    samples = np.arange(len(windy)) % (len(follower._path.points_m) - 1)
+    tangents = follower._path.tangents[samples, :2]
+    curvatures = follower._path.curvatures_1pm[samples, :2]
     needed = (
-        windy[:, None] * follower._path.tangents[:, :2]
-        + (windy[:, None] ** 2 * follower._path.curvatures_1pm[:, :2] + [push, 0.0]) / plane.rate_ps
+        windy[:, None] * tangents + (windy[:, None] ** 2 * curvatures + [push, 0.0]) / plane.rate_ps
     )
+    eastward = tangents[:, 0]
     slowest = windy <= 0.151
     assert (np.linalg.norm(needed, axis=1) <= 0.93 * plane.top_speed)[~slowest].all()
     assert windy[eastward > 0.9].max() < windy[eastward < -0.9].min()
@@ -149,9 +151,9 @@ def test_no_speed_is_planned_that_the_wind_forbids(plant):
 def test_speeds_fall_no_faster_than_the_vehicle_brakes():
     corner = line(5.0) + [(x + 4.9, y, z, 1.5) for x, y, z, _ in line(5.0, yaw=1.5)[1:]]
     follower = follower_of(corner)
-    squares = follower._profile_mps**2
+    squares = follower._plan_mps**2
     assert np.diff(squares).min() >= -2.0 * 0.6 * follower._path.spacing_m - 1e-9
-    assert follower._profile_mps.min() < 0.5
+    assert follower._plan_mps[: len(squares) // 2 + 20].min() < 0.5
 
 
 class TestDisturbance:
@@ -164,7 +166,8 @@ class TestDisturbance:
         command = Rig().command
         for tick in range(400):
             vx = 0.2 * math.sin(0.02 * tick) if in_hand else 0.0
-            asked_mps += PERIOD_S / plane.late_s * (plane.speed * vx - asked_mps)
+            share = PERIOD_S / plane.late_s if plane.late_s else 1.0
+            asked_mps += share * (plane.speed * vx - asked_mps)
             speed_mps += PERIOD_S * (plane.rate_ps * (asked_mps - speed_mps) + wind_mps2)
             known.observe(
                 pose(tick, velocity=(speed_mps, 0.0, 0.0)), replace(command, vx=vx), PERIOD_S
