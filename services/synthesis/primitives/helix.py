@@ -68,20 +68,25 @@ class Helix(Shape):
         circle = fit_circle(points_m[:, :2])
         if circle.swept_rad <= 1e-6:
             raise UnfitError("no part of a turn was flown")
-        circle, height, pitch, height_std, pitch_std = _refined(circle, points_m)
-        turned = circle.sense * circle.angles_rad / (2.0 * math.pi)
+        circle, height, pitch, covariance = _refined(circle, points_m)
+        scale = circle.sense / (2.0 * math.pi)
+        turned = scale * circle.angles_rad
         off = points_m[:, 2] - height - pitch * (turned - turned.mean())
         rms = math.sqrt(float(np.mean(circle.off_m**2) + np.mean(off**2)))
         start_rad = circle.angle_of(start_m[:2])
-        since_mean = circle.sense * start_rad / (2.0 * math.pi) - float(turned.mean())
+        since_mean = scale * start_rad - float(turned.mean())
+        # How the height beside the vehicle follows each of the five parameters.
+        turns = _turns(circle.centre_m, points_m)
+        at_start = _turns(circle.centre_m, start_m[None])[:, 0] - turns.mean(axis=1)
+        slopes = np.array([*(pitch * scale * at_start), 0.0, 1.0, since_mean])
         return cls(
             _climbing(circle.quality(rms), pitch, circle.radius_m),
             circle,
             start_rad,
             height + pitch * since_mean,
-            math.hypot(height_std, pitch_std * since_mean),
+            math.sqrt(max(float(slopes @ covariance @ slopes), 0.0)),
             pitch,
-            pitch_std,
+            math.sqrt(max(float(covariance[4, 4]), 0.0)),
         )
 
     @property
@@ -142,8 +147,15 @@ class Helix(Shape):
         return np.column_stack([xy, self.start_height_m + self.pitch_m * turned])
 
 
-def _refined(circle: Circle, points_m: Array) -> tuple[Circle, float, float, float, float]:
-    """The circle, the mean height, the pitch, and both their errors, by all three coordinates."""
+def _turns(centre_m: Array, points_m: Array) -> Array:
+    """How the angles of points (N, 2 or more) follow the centre's x and y, (2, N) in rad/m."""
+    dx, dy = centre_m[:, None] - points_m[:, :2].T
+    square = np.maximum(dx**2 + dy**2, 1e-18)
+    return np.stack([-dy / square, dx / square])
+
+
+def _refined(circle: Circle, points_m: Array) -> tuple[Circle, float, float, Array]:
+    """The circle, the mean height and the pitch by all coordinates, and the covariance (5, 5)."""
     x, y, z = points_m.T
     scale = circle.sense / (2.0 * math.pi)
     count = len(z)
@@ -158,11 +170,11 @@ def _refined(circle: Circle, points_m: Array) -> tuple[Circle, float, float, flo
         dx, dy = helix[0] - x, helix[1] - y
         distance = np.maximum(np.hypot(dx, dy), 1e-9)
         turned = scale * angles_about(helix[:2], points_m[:, :2])
+        turns = _turns(helix[:2], points_m)
         slopes = np.zeros((5, 2 * count))
         slopes[0, :count], slopes[1, :count] = dx / distance, dy / distance
         slopes[2, :count] = -1.0
-        for row, turn in ((0, -dy / distance**2), (1, dx / distance**2)):
-            slopes[row, count:] = -helix[4] * scale * (turn - turn.mean())
+        slopes[:2, count:] = -helix[4] * scale * (turns - turns.mean(axis=1, keepdims=True))
         slopes[3, count:] = -1.0
         slopes[4, count:] = turned.mean() - turned
         return slopes
@@ -172,8 +184,8 @@ def _refined(circle: Circle, points_m: Array) -> tuple[Circle, float, float, flo
     pitch = float(turned @ z) / float(turned @ turned)
     start = np.array([*circle.centre_m, circle.radius_m, z.mean(), pitch])
     helix, covariance, _ = levenberg_marquardt(residuals, jacobian, start)
-    errors = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
     centre, radius = helix[:2], abs(float(helix[2]))
+    errors = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
     refined = Circle(
         centre,
         radius,
@@ -182,7 +194,7 @@ def _refined(circle: Circle, points_m: Array) -> tuple[Circle, float, float, flo
         angles_about(centre, points_m[:, :2]),
         np.hypot(x - centre[0], y - centre[1]) - radius,
     )
-    return refined, float(helix[3]), float(helix[4]), float(errors[3]), float(errors[4])
+    return refined, float(helix[3]), float(helix[4]), covariance
 
 
 def _climbing(level: Quality, pitch_m: float, radius_m: float) -> Quality:
