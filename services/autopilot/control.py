@@ -135,7 +135,7 @@ class Controller:
             push = forward + pull[axis] - self.disturbance.plane_mps2[axis]
             speed = pose.velocity[axis] + response.late_s * forward
             wanted.append(speed + push / response.rate_ps)
-        allowed = _within(wanted, reference.along, response.top_speed)
+        allowed = within(wanted, reference.along, response.top_speed)
         self._plane_saturated = allowed != wanted
         forward_mps, left_mps = world_to_heading(allowed[0], allowed[1], yaw_rad)
         return forward_mps / response.speed, left_mps / response.speed
@@ -152,7 +152,7 @@ class Controller:
         return max(-1.0, min(1.0, vz))
 
 
-def _within(wanted: list[float], along: tuple[float, float], limit: float) -> list[float]:
+def within(wanted: list[float], along: tuple[float, float], limit: float) -> list[float]:
     """A level vector of at most a length: what lies along a direction gives way first."""
     if math.hypot(*wanted) <= limit:
         return wanted

@@ -1,7 +1,8 @@
 """A model-predictive controller of the plane, solved by OSQP 50 times a second.
 
-Same path, same plan of speeds, same model of the plant, same estimate of the wind and the same
-PIDs of height and yaw as the autopilot's follower: only the plane's law differs. The thesis says
+Same path, same plan of speeds, same model of the plant, same estimate of the wind, same limits of
+the sticks and the same PIDs of height and yaw as the autopilot's follower: only the plane's law
+differs. The thesis says
 that one was tried and was not superior.
 """
 
@@ -15,9 +16,8 @@ from scipy.signal import cont2discrete
 from common.frames import Array, world_to_heading, yaw_of
 from common.messages import Pose, Suggestion
 from services.autopilot.config import Config
-from services.autopilot.control import Controller, Sticks
+from services.autopilot.control import Controller, Sticks, within
 from services.autopilot.follower import Follower
-from services.autopilot.pid import limit_norm
 from services.autopilot.plants import PLANTS
 
 STEP_S = 0.1
@@ -60,12 +60,13 @@ class PredictiveFollower:
 
     def sticks(self, pose: Pose, age_s: float, dt_s: float) -> Sticks:
         """The sticks for now; arguments as of the follower's."""
-        others = self._follower.sticks(pose, age_s, dt_s)
+        reference = self._follower.reference(pose, age_s, dt_s)
+        others = self._controller.sticks(pose, age_s, reference, dt_s)
         places, speeds = self._follower.places(self._times_s)
         wanted = [
             self._plan(axis, pose, age_s, places[:, axis], speeds[:, axis]) for axis in (0, 1)
         ]
-        east, north = limit_norm(wanted, self._top_mps)
+        east, north = within(wanted, reference.along, self._top_mps)
         forward, left = world_to_heading(east, north, yaw_of(pose.orientation))
         speed = self._controller.plant.plane.speed
         return Sticks(forward / speed, left / speed, others.vz, others.wz)

@@ -47,7 +47,7 @@ class Drone:
         self.velocity = [0.0, 0.0, 0.0]
         self.yaw = 0.0
         self.state = "flying"
-        self.before_s = 0.0
+        self.battery = 0.9
         self.stick = dict(NEUTRAL)
         self.sees = self.holds_pad = True
         self._stop = threading.Event()
@@ -90,7 +90,7 @@ class Drone:
         return {k: v for k, v in message.items() if k not in ("stamp", "seq")}
 
     def status(self) -> dict[str, Any]:
-        message = {**GOOD["VehicleStatus"], "state": self.state}
+        message = {**GOOD["VehicleStatus"], "state": self.state, "battery": self.battery}
         return {k: v for k, v in message.items() if k not in ("stamp", "seq")}
 
     def line(self, length_m: float = 30.0, **more: Any) -> dict[str, Any]:
@@ -263,6 +263,20 @@ class TestDecide:
         number = drone.suggest(drone.line())
         reply = decide(client, "accept", suggestion=number)
         assert (reply["ok"], reply["reason"], reply["mode"]) == (False, "landed", "landed")
+
+    def test_a_path_beyond_the_fence_and_one_on_a_low_battery_are_refused(self, client, drone):
+        far = drone.line(5.0)
+        far["path"][-1][0] += 150.0
+        assert decide(client, "accept", suggestion=drone.suggest(far))["reason"] == "geofence"
+        drone.battery = 0.15
+        client.next("health/autopilot", lambda h: "battery 15%" in h["detail"])
+        number = drone.suggest(drone.line())
+        assert decide(client, "accept", suggestion=number)["reason"] == "battery_low"
+        drone.battery = 0.04
+        command = client.next("command", lambda c: c["action"] == "land")
+        assert velocity(command) == (0.0, 0.0, 0.0, 0.0)
+        drone.stick["vx"] = 0.5
+        client.next("command", lambda c: (c["action"], c["vx"]) == ("fly", 0.5))
 
     def test_takeoff_land_and_emergency_reach_the_vehicle(self, client, drone):
         drone.state = "landed"
