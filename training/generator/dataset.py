@@ -212,15 +212,24 @@ def hovering(
     operators: int, seconds: float, seed: int, families: Sequence[Family] = FAMILIES
 ) -> list[Primitive]:
     """Hover corrections without a pause, `seconds` of each of `operators` people."""
+    return [primitive for primitive, _ in holds(operators, seconds, seed, families)]
+
+
+def holds(
+    operators: int, seconds: float, seed: int, families: Sequence[Family] = FAMILIES
+) -> list[tuple[Primitive, Array]]:
+    """As `hovering`, each with x y z in m and yaw in rad (N, 4) of the vehicle, every `STEP_S`."""
     members = [families[k % len(families)] for k in range(operators)]
     rng = np.random.default_rng(seed)
     people = draw_people(members, rng)
     count = round(seconds / STEP_S) + 1
     offset = worn_offset(people, rng)
-    sticks = nothing.hover(people, count, offset, rng)
+    sticks, places = nothing.held_place(people, count, offset, rng)
     messages = read(sticks, np.full(operators, count), offset, people, rng, begun=False)
     source = f"generator hover seed {seed}"
     return [
-        Primitive(times_s, read_, NONE, f"{family.name}-{number:04d}", family.name, source)
-        for number, (family, (times_s, read_)) in enumerate(zip(members, messages, strict=True))
+        (Primitive(times_s, read_, NONE, f"{family.name}-{number:04d}", family.name, source), place)
+        for number, (family, (times_s, read_), place) in enumerate(
+            zip(members, messages, places, strict=True)
+        )
     ]

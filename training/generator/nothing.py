@@ -86,9 +86,19 @@ def free(people: People, count: int, rng: np.random.Generator) -> Array:
 
 
 def hover(people: People, count: int, offset: Array, rng: np.random.Generator) -> Array:
-    """Sticks (n, count, 4) of people who hold a vehicle in its place in wind.
+    """Sticks (n, count, 4) of people who hold a vehicle in its place in wind."""
+    return held_place(people, count, offset, rng)[0]
 
-    They push back what has moved away by more than they mind, and take the speed out of it again.
+
+def held_place(
+    people: People, count: int, offset: Array, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """The sticks of `hover`, and where the vehicle was.
+
+    People push back what has moved away by more than they mind, and take the speed out of it again.
+
+    Returns:
+        Sticks (n, count, 4), and x y z in m and yaw in rad (n, count, 4).
     """
     n = len(people)
     gust = rng.uniform(*GUST_MPS, (n, 1, 1))
@@ -114,8 +124,9 @@ def hover(people: People, count: int, offset: Array, rng: np.random.Generator) -
     aim, first, hand, still = (np.zeros((n, 4)) for _ in range(4))
     acts = np.zeros((n, 3), dtype=bool)
     rows = np.arange(n)
-    out = np.empty((n, count, 4))
+    out, places = np.empty((n, count, 4)), np.empty((n, count, 4))
     for i in range(count):
+        places[:, i] = np.column_stack([where, heading])
         drifted = where + damping_s * speed
         # Once at it, people go on until the error is well below what they mind.
         acts = np.abs(drifted) > np.where(acts, 0.4, 1.0) * minded_m
@@ -156,4 +167,4 @@ def hover(people: People, count: int, offset: Array, rng: np.random.Generator) -
         speed = keep_vehicle * speed + (1.0 - keep_vehicle) * (world * full + air[:, i])
         where = where + speed * STEP_S
         heading = heading + (stick[:, 3] * FULL_YAW_RADPS + twist[:, i]) * STEP_S
-    return shaken(out, people, rng)
+    return shaken(out, people, rng), places
