@@ -6,43 +6,38 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import onnx
 import torch
 
-from services.classifier.model import CONTRACT, INPUTS, OUTPUT
+from services.classifier.model import CONTRACT, INPUTS, OUTPUTS
 from services.classifier.window import MODEL_RATE_HZ
-from training.fit import Fitted
-from training.network import Probabilities
+from training.fit import FULL_YAW_RADPS, Fitted, inputs_of
+from training.windows import padded
 
 OPSET = 17
-EXAMPLE_SAMPLES = 64
+EXAMPLE_SAMPLES = (64, 44)
 
 
 def export(fitted: Fitted, labels: Sequence[str], name: str, path: Path) -> str:
-    """Write a network with its softmax and temperature; returns the file's SHA-256 in hex.
+    """Write a network with its calibration; returns the file's SHA-256 in hex.
 
     Batch and time stay free: a service gives a motion its own length, without padding.
     """
-    model = Probabilities(fitted.network, fitted.temperature).eval()
-    example = (
-        torch.randn(2, EXAMPLE_SAMPLES, 3) * 0.3,
-        torch.tensor([EXAMPLE_SAMPLES, EXAMPLE_SAMPLES - 20]),
-    )
+    tracks = [np.full((samples, 4), 0.3, dtype=np.float32) for samples in EXAMPLE_SAMPLES]
+    example = inputs_of(padded(tracks, np.zeros(len(tracks), dtype=np.int64)), FULL_YAW_RADPS)
+    axes = {"sticks": {0: "batch", 1: "time"}, "times_s": {0: "batch", 1: "time"}}
     path.parent.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
         # The legacy exporter (the newer one freezes time) warns of itself and of GRU batch sizes.
         warnings.simplefilter("ignore")
         torch.onnx.export(
-            model,
+            fitted.calibrated,
             example,
             str(path),
             input_names=list(INPUTS),
-            output_names=[OUTPUT],
-            dynamic_axes={
-                INPUTS[0]: {0: "batch", 1: "time"},
-                INPUTS[1]: {0: "batch"},
-                OUTPUT: {0: "batch"},
-            },
+            output_names=list(OUTPUTS),
+            dynamic_axes={key: axes.get(key, {0: "batch"}) for key in (*INPUTS, *OUTPUTS)},
             opset_version=OPSET,
             dynamo=False,
             external_data=False,
@@ -53,6 +48,7 @@ def export(fitted: Fitted, labels: Sequence[str], name: str, path: Path) -> str:
         "name": name,
         "labels": json.dumps(list(labels)),
         "rate_hz": str(MODEL_RATE_HZ),
+        "confidence_min": f"{fitted.confidence_min:.4f}",
     }
     onnx.helper.set_model_props(graph, metadata)
     onnx.checker.check_model(graph, full_check=True)

@@ -1,80 +1,52 @@
-"""The network of the thesis, four convolutions and two GRUs, on what the sticks draw in space.
+"""Four convolutions and two GRUs, as in the thesis, on what the sticks draw in space.
 
 One graph from raw sticks to probabilities: everything the network sees is computed inside, so that
 no service can prepare its input otherwise than training did.
 """
 
-import math
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
-RATE_HZ = 50.0
-CHANNELS = 12
-SMOOTH_TAPS = 9
-"""0.18 s: above tremor's period, below the quickest gesture's."""
-TURN_TAPS = 15
-STILL = 0.1
-"""Below this deflection a direction is mostly noise."""
+from training.geometry import Geometry
+from training.labels import PRIMITIVES
+
+LEAK = 0.1
+LARGEST = 6.0
+"""Inputs beyond so many standard deviations say no more than this."""
+# Decisions, each yes or no: curved, climbing, alternating. A primitive is what they come to; those
+# that do not bear on it are left out (its row's sign is 0).
+DECISIONS = {
+    "line": (-1, 0, 0),
+    "arc": (1, -1, -1),
+    "sine": (1, -1, 1),
+    "helix": (1, 1, 0),
+}
 
 
-def _smoothed(x: Tensor, mask: Tensor, taps: int) -> Tensor:
-    """Running means over time of (B, C, T), which leave padding out (mask (B, 1, T))."""
-    share = F.avg_pool1d(mask, taps, 1, taps // 2)
-    mean = F.avg_pool1d(x * mask, taps, 1, taps // 2)
-    return mean / share.clamp(min=1.0 / taps) * mask
+@dataclass(frozen=True)
+class Architecture:
+    """Sizes, and what may be left out to see what it is worth.
 
-
-class Geometry(nn.Module):
-    """Sticks as geometry that does not change when the whole motion is turned about z.
-
-    Input sticks (B, T, 3) and mask (B, 1, T); output (B, CHANNELS, T), 0 where padded.
+    Attributes:
+        width: channels of the convolutions and units of the GRUs.
+        summary: units of the two layers that read the summary; 0 leaves it out.
+        head: units of the head's hidden layer.
+        dropout: of all dropout layers.
+        geometry: whether convolutions see geometry, or the sticks alone.
+        decisions: whether the four probabilities are composed of three decisions.
+        pooling: what is taken of the GRUs' states over time.
     """
 
-    def forward(self, sticks: Tensor, mask: Tensor) -> Tensor:
-        """The channels: velocity and path in the frame of the chord, heading, turn, time, climb."""
-        v = _smoothed(sticks.transpose(1, 2), mask, SMOOTH_TAPS)
-        vx, vy, vz = v[:, 0:1], v[:, 1:2], v[:, 2:3]
-        count = mask.sum(2, keepdim=True)
-        speed = torch.sqrt(vx * vx + vy * vy + 1e-12) * mask
-        # The chord from the first place to the last is the x axis of all that follows.
-        chord_x, chord_y = vx.sum(2, keepdim=True), vy.sum(2, keepdim=True)
-        chord = torch.sqrt(chord_x * chord_x + chord_y * chord_y + 1e-6)
-        c, s = chord_x / chord, chord_y / chord
-        along, across = c * vx + s * vy, c * vy - s * vx
-        # Heading, unwrapped, as a sum of small turns; those of a resting stick count for nothing.
-        ax, ay = vx[:, :, :-1], vy[:, :, :-1]
-        bx, by = vx[:, :, 1:], vy[:, :, 1:]
-        dot = ax * bx + ay * by
-        step = torch.atan2(ax * by - ay * bx, dot + 1e-9)
-        energy = speed[:, :, :-1] * speed[:, :, 1:]
-        step = F.pad(step * energy / (energy + STILL * STILL), (1, 0)) * mask
-        heading = torch.cumsum(step, 2) * mask
-        heading = (heading - heading.sum(2, keepdim=True) / count) * mask
-        turn = _smoothed(step, mask, TURN_TAPS) * RATE_HZ
-        length = torch.sqrt((v * v).sum(1, keepdim=True) + 1e-12) * mask
-        total = length.sum(2, keepdim=True).clamp(min=1.0)
-        path = torch.cumsum(torch.cat([along, across, vz], 1), 2) * mask
-        path = (path - path.sum(2, keepdim=True) / count) / total * mask
-        level = (total / count).clamp(min=0.05)
-        elapsed = torch.cumsum(mask, 2) / (RATE_HZ * 4.0) * mask
-        climb = vz.abs().sum(2, keepdim=True) / total * mask
-        return torch.cat(
-            [
-                along / level,
-                across / level,
-                vz / level,
-                speed,
-                heading / math.pi,
-                turn,
-                turn / speed.clamp(min=STILL) * level,
-                path * 4.0,
-                elapsed,
-                climb,
-            ],
-            1,
-        )
+    width: int = 48
+    summary: int = 128
+    head: int = 64
+    dropout: float = 0.1
+    geometry: bool = True
+    decisions: bool = True
+    pooling: tuple[str, ...] = ("last", "mean", "largest")
 
 
 class _Convolution(nn.Module):
@@ -88,25 +60,31 @@ class _Convolution(nn.Module):
 
     def forward(self, x: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
         mask = mask[:, :, :: self.stride]
-        return F.leaky_relu(self.norm(self.conv(x)), 0.1) * mask, mask
+        return F.leaky_relu(self.norm(self.conv(x)), LEAK) * mask, mask
 
 
-class CnnGru(nn.Module):
-    """Four convolutions, two GRUs, pooling over what is not padding, and logits.
+class Encoder(nn.Module):
+    """Four convolutions, two GRUs and pooling: series of any length to features of one size.
 
     Args:
-        classes: how many primitives.
+        channels: of the series.
         width: channels of the convolutions and units of the GRUs.
-        dropout: of both dropout layers.
+        dropout: between convolutions and GRUs.
+        pooling: of "last", "mean", "largest".
     """
 
-    def __init__(self, classes: int, width: int = 64, dropout: float = 0.25) -> None:
+    def __init__(
+        self,
+        channels: int,
+        width: int,
+        dropout: float,
+        pooling: tuple[str, ...] = Architecture.pooling,
+    ) -> None:
         super().__init__()
-        self.geometry = Geometry()
-        self.standardise = nn.BatchNorm1d(CHANNELS)
+        self.standardise = nn.BatchNorm1d(channels)
         self.convolutions = nn.ModuleList(
             [
-                _Convolution(CHANNELS, width, 7, 1),
+                _Convolution(channels, width, 7, 1),
                 _Convolution(width, width, 5, 2),
                 _Convolution(width, width, 5, 2),
                 _Convolution(width, width, 3, 1),
@@ -114,37 +92,140 @@ class CnnGru(nn.Module):
         )
         self.dropout = nn.Dropout(dropout)
         self.gru = nn.GRU(width, width, num_layers=2, batch_first=True)
-        self.head_dropout = nn.Dropout(dropout)
-        self.head = nn.Linear(3 * width, classes)
+        self.pooling = pooling
+        self.features = width * len(pooling)
 
-    def forward(self, sticks: Tensor, lengths: Tensor) -> Tensor:
-        """Logits (B, classes) of sticks (B, T, 3) of which `lengths` (B,) samples are real."""
-        steps = torch.cumsum(torch.ones_like(sticks[:, :, 0]), 1)
-        mask = (steps <= lengths.unsqueeze(1).to(sticks.dtype)).to(sticks.dtype).unsqueeze(1)
-        with torch.no_grad():
-            x = self.geometry(sticks, mask)
-        x = self.standardise(x) * mask
+    def forward(self, x: Tensor, mask: Tensor) -> Tensor:
+        """Features (B, features) of series (B, channels, T); mask (B, 1, T) is 1 where real."""
+        x = self.standardise(x).clamp(-LARGEST, LARGEST) * mask
         for convolution in self.convolutions:
             x, mask = convolution(x, mask)
         states, _ = self.gru(self.dropout(x.transpose(1, 2)))
         mask = mask.transpose(1, 2)
-        count = mask.sum(1)
-        mean = (states * mask).sum(1) / count
-        largest = (states * mask - 2.0 * (1.0 - mask)).max(1).values
-        # The state at the last real step: the only one whose mask is not followed by another.
-        after = F.pad(mask[:, 1:], (0, 0, 0, 1))
-        last = (states * (mask - after)).sum(1)
-        return self.head(self.head_dropout(torch.cat([last, mean, largest], 1)))  # type: ignore[no-any-return]
+        pooled = []
+        for kind in self.pooling:
+            if kind == "mean":
+                pooled.append((states * mask).sum(1) / mask.sum(1))
+            elif kind == "largest":
+                pooled.append((states * mask - 2.0 * (1.0 - mask)).amax(1))
+            else:
+                # The state at the last real step: the only one that no real one follows.
+                pooled.append((states * (mask - F.pad(mask[:, 1:], (0, 0, 0, 1)))).sum(1))
+        return torch.cat(pooled, 1)
 
 
-class Probabilities(nn.Module):
-    """A network with its temperature and the softmax: what is exported."""
+class Trunk(nn.Module):
+    """The network on any series: the encoder and a linear head, without sticks or geometry.
 
-    def __init__(self, network: CnnGru, temperature: float) -> None:
+    Args:
+        channels: of the series.
+        classes: how many labels.
+        width: channels of the convolutions and units of the GRUs.
+        dropout: of both dropout layers.
+    """
+
+    def __init__(
+        self,
+        channels: int,
+        classes: int,
+        width: int = Architecture.width,
+        dropout: float = Architecture.dropout,
+    ) -> None:
+        super().__init__()
+        self.encoder = Encoder(channels, width, dropout)
+        self.head = nn.Sequential(nn.Dropout(dropout), nn.Linear(self.encoder.features, classes))
+
+    def forward(self, x: Tensor, mask: Tensor) -> Tensor:
+        """Logits (B, classes) of series (B, channels, T >= 7) with a mask (B, 1, T)."""
+        return self.head(self.encoder(x, mask))  # type: ignore[no-any-return]
+
+
+class Network(nn.Module):
+    """From sticks to what they mean: geometry, encoder and summary side by side, decisions."""
+
+    both: Tensor
+    needed: Tensor
+
+    def __init__(self, architecture: Architecture | None = None) -> None:
+        super().__init__()
+        self.architecture = a = architecture or Architecture()
+        self.geometry = Geometry()
+        self.encoder = Encoder(
+            Geometry.CHANNELS if a.geometry else len(Geometry.STICKS),
+            a.width,
+            a.dropout,
+            a.pooling,
+        )
+        features = self.encoder.features
+        if a.summary:
+            # Some features hardly vary: without a floor their rounding errors would count.
+            self.standardise = nn.BatchNorm1d(Geometry.SUMMARY, eps=1e-4)
+            self.reader = nn.Sequential(
+                nn.Linear(Geometry.SUMMARY, a.summary),
+                nn.LeakyReLU(LEAK),
+                nn.Dropout(a.dropout),
+                nn.Linear(a.summary, a.summary),
+                nn.LeakyReLU(LEAK),
+            )
+            features += a.summary
+        answers = 3 if a.decisions else len(PRIMITIVES)
+        self.head = nn.Sequential(
+            nn.Dropout(a.dropout),
+            nn.Linear(features, a.head),
+            nn.LeakyReLU(LEAK),
+            nn.Dropout(a.dropout),
+            nn.Linear(a.head, answers + 1),
+        )
+        signs = torch.tensor([DECISIONS[label] for label in PRIMITIVES], dtype=torch.float32).T
+        # Column k of `both` is decision k; column k + 3 the same denied.
+        self.register_buffer("both", torch.cat([torch.eye(3), -torch.eye(3)], 1), persistent=False)
+        needed = torch.cat([(signs > 0).float(), (signs < 0).float()])
+        self.register_buffer("needed", needed, persistent=False)
+
+    def forward(
+        self, sticks: Tensor, times_s: Tensor, lengths: Tensor, full_yaw_radps: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Logits of the primitives (B, 4) and of `meant` (B,).
+
+        Inputs as in services/classifier/model.py.
+        """
+        with torch.no_grad():
+            x, mask, summary = self.geometry(sticks, times_s, lengths, full_yaw_radps)
+        if not self.architecture.geometry:
+            x = x[:, Geometry.STICKS]
+        features = self.encoder(x, mask)
+        if self.architecture.summary:
+            read = self.reader(self.standardise(summary).clamp(-LARGEST, LARGEST))
+            features = torch.cat([features, read], 1)
+        out = self.head(features)
+        logits, meant = out[:, :-1], out[:, -1]
+        if self.architecture.decisions:
+            # log(sigmoid(z)) = -softplus(-z): the probability of a chain is the sum of these.
+            logits = -F.softplus(-(logits @ self.both)) @ self.needed
+        return logits, meant
+
+
+class Calibrated(nn.Module):
+    """A network with its calibration: what is exported.
+
+    Args:
+        network: which.
+        temperature: divides the primitives' logits.
+        meant: scale and shift of the logit of `meant`.
+    """
+
+    def __init__(
+        self, network: Network, temperature: float, meant: tuple[float, float] = (1.0, 0.0)
+    ) -> None:
         super().__init__()
         self.network = network
         self.temperature = temperature
+        self.meant = meant
 
-    def forward(self, sticks: Tensor, lengths: Tensor) -> Tensor:
-        """Probabilities (B, classes)."""
-        return torch.softmax(self.network(sticks, lengths) / self.temperature, 1)
+    def forward(
+        self, sticks: Tensor, times_s: Tensor, lengths: Tensor, full_yaw_radps: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Probabilities (B, 4) and meant (B,)."""
+        logits, meant = self.network(sticks, times_s, lengths, full_yaw_radps)
+        scale, shift = self.meant
+        return torch.softmax(logits / self.temperature, 1), torch.sigmoid(meant * scale + shift)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.metrics import confusion_matrix, f1_score
+from sklearn.metrics import confusion_matrix, f1_score, roc_auc_score
 
 BOOTSTRAPS = 1000
 CALIBRATION_BINS = 15
@@ -38,7 +38,13 @@ def weighted_f1(truth: IntArray, said: IntArray) -> float:
     return float(f1_score(truth, said, average="weighted", zero_division=0.0))
 
 
-def score(truth: IntArray, said: IntArray, operators: IntArray, classes: int, seed: int) -> Score:
+def score(
+    truth: IntArray,
+    said: IntArray,
+    operators: IntArray | NDArray[np.str_],
+    classes: int,
+    seed: int,
+) -> Score:
     """The figures; people, not primitives, are drawn again, as one person's are alike."""
     rng = np.random.default_rng(seed)
     people = np.unique(operators)
@@ -84,3 +90,8 @@ def calibration_error(probabilities: NDArray[np.float64], truth: IntArray) -> fl
             gap = abs(float(right[inside].mean()) - float(confidence[inside].mean()))
             total += gap * float(inside.mean())
     return total
+
+
+def none_auroc(meant: NDArray[np.floating], is_meant: NDArray[np.bool_]) -> float:
+    """How well `meant` tells primitives from none: the area under the ROC curve."""
+    return float(roc_auc_score(is_meant, meant))

@@ -1,8 +1,7 @@
 """From nothing to a model file: generate people, train, judge on others, export, write the card."""
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -10,48 +9,47 @@ import numpy as np
 
 from services.classifier.model import OnnxModel
 from training.card import card_of
-from training.dataset.primitive import Primitive
 from training.export import export
-from training.fit import Epoch, Fitted, fit
-from training.generator.dataset import THESIS_COUNTS, counts_of, generate
+from training.fit import FULL_YAW_RADPS, Budget, Epoch, Fitted, Training
 from training.labels import PRIMITIVES
-from training.scores import Score, calibration_error, score, weighted_f1
-from training.svm import features, fit_svm
-from training.windows import Examples, Windows, examples_of, seen_after
+from training.people import Share, people_of
+from training.scores import Score, calibration_error, none_auroc, score, weighted_f1
+from training.windows import NONE_INDEX, Examples, Windows, examples_of, seen_after
 
 MODEL_NAME = "intent"
 EARLY_S = (1.0, 1.5, 2.0, 3.0)
+PARITY_ROWS = 200
 
 
 @dataclass(frozen=True)
 class Preset:
-    """How much to train on; sets are multiples of the thesis' 2399 primitives.
+    """How much to train on.
 
     Attributes:
-        operators: people to train on; `people` of validation and test are others.
-        multiple: of the thesis' counts to train on.
-        epochs: at most.
+        training: people to learn from.
+        validation: people to choose and calibrate by.
+        test: people to judge on.
+        budget: how long.
     """
 
-    operators: int
-    multiple: float
-    epochs: int
-    validation_operators: int = 40
-    validation_multiple: float = 0.5
-    test_operators: int = 50
-    test_multiple: float = 1.0
+    training: Share
+    validation: Share
+    test: Share
+    budget: Budget
 
 
 PRESETS = {
-    "shipped": Preset(operators=400, multiple=6.0, epochs=45),
+    "shipped": Preset(
+        training=Share(wide_people=800, wide=12.0, thesis_people=300, thesis=6.0),
+        validation=Share(wide_people=75, wide=0.7, thesis_people=50, thesis=0.4),
+        test=Share(wide_people=100, wide=1.0, thesis_people=50, thesis=1.0),
+        budget=Budget(windows=1_000_000),
+    ),
     "quick": Preset(
-        operators=40,
-        multiple=0.4,
-        epochs=6,
-        validation_operators=10,
-        validation_multiple=0.1,
-        test_operators=20,
-        test_multiple=0.2,
+        training=Share(wide_people=24, wide=0.4, thesis_people=10, thesis=0.2),
+        validation=Share(wide_people=12, wide=0.1, thesis_people=5, thesis=0.05),
+        test=Share(wide_people=12, wide=0.15, thesis_people=10, thesis=0.15),
+        budget=Budget(windows=12_000),
     ),
 }
 
@@ -60,7 +58,7 @@ class Progress(Protocol):
     """Where a run tells how far it is."""
 
     def generating(self, name: str, done: int, total: int) -> None:
-        """So many primitives of a set are made."""
+        """So many parts of a set are made."""
         ...
 
     def batch(self, done: int, total: int) -> None:
@@ -74,19 +72,22 @@ class Progress(Protocol):
 
 @dataclass(frozen=True)
 class Judged:
-    """One classifier's scores on the people held out.
+    """The model's scores on people of one population, whom it has not learned from.
 
     Attributes:
+        name: of the population.
         whole: at the end of each primitive.
         early: (seconds since the motion began, score).
-        calibration: expected calibration error at the end; None where there are no probabilities.
+        calibration: expected calibration error at the end.
+        auroc: of `meant`, primitives against none, at the end.
         families: weighted F1 by kind of people, at the end.
     """
 
     name: str
     whole: Score
     early: tuple[tuple[float, Score], ...]
-    calibration: float | None
+    calibration: float
+    auroc: float
     families: dict[str, float]
 
 
@@ -97,6 +98,7 @@ class Run:
     preset_name: str
     preset: Preset
     seed: int
+    sizes: dict[str, int]
     judged: tuple[Judged, ...]
     fitted: Fitted
     sha256: str
@@ -104,148 +106,133 @@ class Run:
     parity: float
 
 
-def _set(
-    name: str, operators: int, multiple: float, seed: int, progress: Progress
-) -> list[Primitive]:
-    wanted = counts_of(multiple)
-    total, done = sum(wanted.values()), 0
-
-    def advance(more: int) -> None:
-        nonlocal done
-        done += more
-        progress.generating(name, done, total)
-
-    primitives = generate(operators, wanted, seed, progress=advance)
-    progress.generating(name, total, total)
-    return primitives
+def answers_of(model: OnnxModel, windows: Windows) -> tuple[np.ndarray, np.ndarray]:
+    """Probabilities (n, 4) and meant (n,) of windows by a model file, one window at a time."""
+    yaw = np.full(1, FULL_YAW_RADPS, dtype=np.float32)
+    rows = [
+        model.answers(
+            np.ascontiguousarray(sticks[None, :length]), np.array([length], dtype=np.int64), yaw
+        )
+        for sticks, length in zip(windows.sticks, windows.lengths, strict=True)
+    ]
+    return np.concatenate([p for p, _ in rows]), np.concatenate([m for _, m in rows])
 
 
-def judge(
-    name: str,
-    say: Callable[[Windows], np.ndarray],
-    examples: Examples,
-    families: list[str],
-    has_probabilities: bool,
-) -> Judged:
-    """Score a classifier at the end of each primitive and early in it.
+def judge(name: str, model: OnnxModel, examples: Examples) -> Judged:
+    """Score a model file at the end of each primitive and early in it.
 
     Args:
-        name: in the table.
-        say: probabilities (or any scores) (n, classes) of windows.
-        examples: of people that it has not seen.
-        families: the kind of people of each example.
-        has_probabilities: whether `say` gives probabilities.
+        name: of the population.
+        model: the file.
+        examples: of people that it has not learned from, `none` among them.
     """
+    is_meant = examples.labels != NONE_INDEX
+    shapes = examples.rows(np.flatnonzero(is_meant))
+    whole, meant = answers_of(model, seen_after(examples, None))
+    truth, people = shapes.labels, shapes.operators
+    said = whole[is_meant].argmax(axis=1)
     classes = len(PRIMITIVES)
-    whole_said = say(seen_after(examples, None))
-    truth, people = examples.labels, examples.operators
-    said = whole_said.argmax(axis=1)
-    early = tuple(
-        (after, score(truth, say(seen_after(examples, after)).argmax(axis=1), people, classes, 0))
-        for after in EARLY_S
+    early = []
+    for after_s in EARLY_S:
+        then = answers_of(model, seen_after(shapes, after_s))[0].argmax(axis=1)
+        early.append((after_s, score(truth, then, people, classes, 0)))
+    return Judged(
+        name,
+        score(truth, said, people, classes, 0),
+        tuple(early),
+        calibration_error(whole[is_meant], truth),
+        none_auroc(meant, is_meant),
+        {
+            str(kind): weighted_f1(truth[shapes.families == kind], said[shapes.families == kind])
+            for kind in dict.fromkeys(shapes.families.tolist())
+        },
     )
-    kinds = np.array(families)
-    by_family = {
-        kind: weighted_f1(truth[kinds == kind], said[kinds == kind])
-        for kind in dict.fromkeys(families)
-    }
-    error = calibration_error(whole_said, truth) if has_probabilities else None
-    return Judged(name, score(truth, said, people, classes, 0), early, error, by_family)
 
 
-def parity(model: OnnxModel, fitted: Fitted, windows: Windows, rows: int = 200) -> float:
-    """The largest difference between the file's probabilities and torch's, unpadded rows."""
-    import torch
-
-    from training.network import Probabilities
-
-    reference = Probabilities(fitted.network, fitted.temperature).eval()
-    largest = 0.0
-    for sticks, length in zip(windows.sticks[:rows], windows.lengths[:rows], strict=True):
-        window = np.ascontiguousarray(sticks[:length])
-        with torch.no_grad():
-            wanted = reference(torch.from_numpy(window[None]), torch.tensor([length])).numpy()[0]
-        largest = max(largest, float(np.abs(model.probabilities(window) - wanted).max()))
-    return largest
+def parity(model: OnnxModel, fitted: Fitted, windows: Windows) -> float:
+    """The largest difference between the file's answers and torch's."""
+    some = Windows(
+        windows.sticks[:PARITY_ROWS],
+        windows.times_s[:PARITY_ROWS],
+        windows.lengths[:PARITY_ROWS],
+        windows.labels[:PARITY_ROWS],
+    )
+    given, wanted = answers_of(model, some), fitted.answers(some)
+    return max(float(np.abs(a - b).max()) for a, b in zip(given, wanted, strict=True))
 
 
-def train(preset_name: str, seed: int, out: Path, progress: Progress) -> Run:
+def train(
+    preset_name: str,
+    seed: int,
+    out: Path,
+    progress: Progress,
+    *,
+    resume: bool = False,
+    processes: int = 1,
+) -> Run:
     """Train, judge, export to `out`/intent.onnx and write the card `out`/README.md.
+
+    After each epoch all that is needed to go on is written to `out`/intent.checkpoint.
+
+    Args:
+        preset_name: a key of `PRESETS`.
+        seed: the same seed and machine give the same file.
+        out: folder.
+        progress: told how far it is.
+        resume: go on with a run of the same preset and seed that was stopped.
+        processes: that make the people side by side.
 
     Raises:
         ValueError: on an unknown preset.
+        OSError: if there is nothing to resume, or it is of another run.
     """
     if preset_name not in PRESETS:
         raise ValueError(f"preset {preset_name!r}: use one of {', '.join(PRESETS)}")
     preset = PRESETS[preset_name]
-    # A seed for each set: people of different sets are different people.
-    seeds = np.random.SeedSequence(seed).generate_state(3)
-    training = examples_of(
-        _set("training", preset.operators, preset.multiple, int(seeds[0]), progress)
-    )
-    validation = examples_of(
-        _set(
-            "validation",
-            preset.validation_operators,
-            preset.validation_multiple,
-            int(seeds[1]),
-            progress,
-        )
-    )
-    tested = _set("test", preset.test_operators, preset.test_multiple, int(seeds[2]), progress)
-    test = examples_of(tested)
+    checkpoint = out / f"{MODEL_NAME}.checkpoint"
+    if resume and not checkpoint.exists():
+        raise OSError(f"--resume: there is no {checkpoint}; run without it to begin anew")
+    seeds = [int(state) for state in np.random.SeedSequence(seed).generate_state(3)]
 
-    fitted = fit(
-        training,
-        validation,
-        len(PRIMITIVES),
-        preset.epochs,
-        seed,
-        progress.batch,
-        lambda epoch: progress.epoch(epoch, preset.epochs),
-    )
+    def people(name: str, share: Share, number: int) -> Examples:
+        made = people_of(name, share, seeds[number], processes, progress.generating)
+        return examples_of(made)
+
+    training = people("training", preset.training, 0)
+    validation = people("validation", preset.validation, 1)
+    run = Training(training, validation, seed, preset.budget, name=f"{preset_name} seed {seed}")
+    if resume:
+        run.resume(checkpoint)
+    out.mkdir(parents=True, exist_ok=True)
+    while not run.is_over:
+        progress.epoch(run.epoch(progress.batch), run.epochs)
+        run.save(checkpoint)
+    fitted = run.fitted()
     path = out / f"{MODEL_NAME}.onnx"
     sha256 = export(fitted, PRIMITIVES, MODEL_NAME, path)
     model = OnnxModel(path)
-    machine = fit_svm(seen_after(_share(training, sum(THESIS_COUNTS.values())), None))
-    families = [primitive.family for primitive in tested]
-    run = Run(
+
+    test = people("test", preset.test, 2)
+    is_wide = np.char.find(test.operators, "test-wide") == 0
+    sets = {
+        "calibrated": test.rows(np.flatnonzero(~is_wide)),
+        "wide": test.rows(np.flatnonzero(is_wide)),
+    }
+    done = Run(
         preset_name=preset_name,
         preset=preset,
         seed=seed,
-        judged=(
-            judge("CNN-GRU", lambda w: _batched(model, w), test, families, True),
-            judge(
-                "SVM (thesis)",
-                lambda w: machine.decision_function(features(w)),
-                test,
-                families,
-                False,
-            ),
-        ),
+        sizes={"training": len(training), "validation": len(validation), "test": len(test)},
+        judged=tuple(judge(name, model, one) for name, one in sets.items()),
         fitted=fitted,
         sha256=sha256,
         path=path,
         parity=parity(model, fitted, seen_after(test, None)),
     )
-    (out / "README.md").write_text(card_of(run))
-    (out / f"{MODEL_NAME}.json").write_text(json.dumps(figures(run), indent=2) + "\n")
-    return run
-
-
-def _share(examples: Examples, count: int) -> Examples:
-    """About `count` examples, evenly picked: the SVM gets as many as the thesis has."""
-    step = max(1, len(examples.tracks) // count)
-    return Examples(examples.tracks[::step], examples.labels[::step], examples.operators[::step])
-
-
-def _batched(model: OnnxModel, windows: Windows) -> np.ndarray:
-    return np.stack(
-        [
-            model.probabilities(np.ascontiguousarray(sticks[:length]))
-            for sticks, length in zip(windows.sticks, windows.lengths, strict=True)
-        ]
-    )
+    (out / "README.md").write_text(card_of(done))
+    (out / f"{MODEL_NAME}.json").write_text(json.dumps(figures(done), indent=1) + "\n")
+    checkpoint.unlink()
+    return done
 
 
 def figures(run: Run) -> dict[str, object]:
@@ -255,7 +242,8 @@ def figures(run: Run) -> dict[str, object]:
         "seed": run.seed,
         "sha256": run.sha256,
         "parity": run.parity,
-        "classifiers": {
+        "confidence_min": run.fitted.confidence_min,
+        "sets": {
             judged.name: {
                 "accuracy": judged.whole.accuracy,
                 "f1": judged.whole.f1,
@@ -265,8 +253,10 @@ def figures(run: Run) -> dict[str, object]:
                 "operators": judged.whole.operators,
                 "early_f1": {str(after): s.f1 for after, s in judged.early},
                 "calibration_error": judged.calibration,
+                "none_auroc": judged.auroc,
                 "families": judged.families,
             }
             for judged in run.judged
         },
+        "history": [asdict(epoch) for epoch in run.fitted.history],
     }

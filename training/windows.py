@@ -7,17 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from common.sticks import FULL_STICK
-from services.classifier.window import MODEL_RATE_HZ, WINDOW_SAMPLES, at_rate, in_start_frame
+from services.classifier.model import SHORTEST_SAMPLES
+from services.classifier.window import MODEL_RATE_HZ, WINDOW_SAMPLES, at_rate, newest_motion
 from training.dataset.primitive import Primitive
-from training.labels import PRIMITIVES
+from training.labels import CLASSES, NONE
 
 Array32 = NDArray[np.float32]
 IntArray = NDArray[np.int64]
+Text = NDArray[np.str_]
 
-SHORTEST_SAMPLES = 40
-"""Windows of less than 0.8 s are never asked for."""
+NONE_INDEX = CLASSES.index(NONE)
+EARLY_SAMPLES = 40
+"""Most windows hold 0.8 s at least; what came before that tells little, and is asked for once."""
 WHOLE_SHARE = 0.35
+SHORTER_SHARE = 0.3
+"""Of the cut windows, those that may be as short as a model may be asked."""
 HEAD_CUT_SHARE = 0.25
 MIRROR_SHARE = 0.5
 SPLICE_SHARE = 0.15
@@ -28,7 +32,9 @@ SETTLED_SAMPLES = 60
 JOINT_SAMPLES = 15
 SLOW = 0.15
 """Horizontal deflections below this have no direction to join by."""
-SCALE = (0.5, 1.1)
+SCALE = (0.45, 1.1)
+MOTION_SHARE = 0.5
+"""Of the windows of nothing, those that begin where a service would see a motion begin."""
 
 
 @dataclass(frozen=True)
@@ -36,52 +42,71 @@ class Examples:
     """Primitives at the model's rate.
 
     Attributes:
-        tracks: each (N, 3) vx vy vz at `MODEL_RATE_HZ`, in the frame of its start.
-        labels: (n,) indices of labels.
+        tracks: each (N, 4) vx vy vz wz at `MODEL_RATE_HZ`, heading frame, as a pad sends them.
+        labels: (n,) indices of `CLASSES`.
         operators: (n,) who performed each.
+        families: (n,) their kind of people.
     """
 
     tracks: tuple[Array32, ...]
     labels: IntArray
-    operators: IntArray
+    operators: Text
+    families: Text
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.tracks)
+
+    def rows(self, index: IntArray) -> "Examples":
+        """Those at these places."""
+        return Examples(
+            tuple(self.tracks[k] for k in index),
+            self.labels[index],
+            self.operators[index],
+            self.families[index],
+        )
 
 
 @dataclass(frozen=True)
 class Windows:
-    """Windows as the network takes them.
+    """Windows as a model's file takes them, and what they are.
 
     Attributes:
-        sticks: (n, T, 3), zero after a window's own length.
+        sticks: (n, T, 4), zero after a window's own length.
+        times_s: (n, T) since each window's first sample.
         lengths: (n,) real samples of each.
-        labels: (n,).
+        labels: (n,) indices of `CLASSES`.
     """
 
     sticks: Array32
+    times_s: Array32
     lengths: IntArray
     labels: IntArray
 
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.labels)
+
 
 def examples_of(primitives: Sequence[Primitive]) -> Examples:
-    """Primitives through the classifier's own preprocessing."""
-    yaw_radps = FULL_STICK["tum"].yaw_radps
-    tracks = tuple(
-        at_rate(p.times_s, in_start_frame(p.times_s, p.sticks, yaw_radps)).astype(np.float32)
-        for p in primitives
-    )
+    """Primitives through the classifier's own resampling."""
     return Examples(
-        tracks,
-        np.array([PRIMITIVES.index(p.label) for p in primitives], dtype=np.int64),
-        np.unique([p.operator for p in primitives], return_inverse=True)[1].astype(np.int64),
+        tuple(at_rate(p.times_s, p.sticks).astype(np.float32) for p in primitives),
+        np.array([CLASSES.index(p.label) for p in primitives], dtype=np.int64),
+        np.array([p.operator for p in primitives], dtype=np.str_),
+        np.array([p.family for p in primitives], dtype=np.str_),
     )
 
 
 def padded(tracks: Sequence[Array32], labels: IntArray) -> Windows:
-    """Tracks of at most `WINDOW_SAMPLES`, zero-padded to that as in the thesis."""
-    sticks = np.zeros((len(tracks), WINDOW_SAMPLES, 3), dtype=np.float32)
+    """Tracks padded with zeros to the longest of them."""
+    lengths = np.array([len(track) for track in tracks], dtype=np.int64)
+    samples = int(lengths.max(initial=0))
+    sticks = np.zeros((len(tracks), samples, 4), dtype=np.float32)
     for row, track in enumerate(tracks):
         sticks[row, : len(track)] = track
-    lengths = np.array([len(track) for track in tracks], dtype=np.int64)
-    return Windows(sticks, lengths, labels)
+    times_s = np.arange(samples, dtype=np.float32) / np.float32(MODEL_RATE_HZ)
+    return Windows(sticks, np.tile(times_s, (len(tracks), 1)), lengths, labels)
 
 
 def seen_after(examples: Examples, seconds: float | None) -> Windows:
@@ -100,6 +125,13 @@ def seen_after(examples: Examples, seconds: float | None) -> Windows:
 def random_windows(
     examples: Examples, rng: np.random.Generator, *, augment: bool = True
 ) -> Windows:
+    """One window of each example; see `random_tracks`."""
+    return padded(random_tracks(examples, rng, augment=augment), examples.labels)
+
+
+def random_tracks(
+    examples: Examples, rng: np.random.Generator, *, augment: bool = True
+) -> list[Array32]:
     """One window of each example: cut at a random time, some without their beginning.
 
     Some begin with the end of another primitive.
@@ -107,25 +139,45 @@ def random_windows(
     Args:
         examples: what to cut.
         rng: source of the cuts.
-        augment: whether to mirror and scale as well.
+        augment: whether to splice, mirror and scale as well.
     """
-    labels = examples.labels
     tracks = []
-    for track in examples.tracks:
-        if rng.random() < SPLICE_SHARE:
-            joined = spliced(examples.tracks[int(rng.integers(len(labels)))], track, rng)
-            if joined is not None:
-                tracks.append(_augmented(joined, rng) if augment else joined)
-                continue
-        end = len(track)
-        if rng.random() > WHOLE_SHARE and end > SHORTEST_SAMPLES:
-            end = int(rng.integers(SHORTEST_SAMPLES, end + 1))
-        begin = max(0, end - WINDOW_SAMPLES)
-        if rng.random() < HEAD_CUT_SHARE and end - begin > 2 * SHORTEST_SAMPLES:
-            begin = int(rng.integers(begin, end - 2 * SHORTEST_SAMPLES))
-        track = track[begin:end]
-        tracks.append(_augmented(track, rng) if augment else track)
-    return padded(tracks, labels)
+    shapes = np.flatnonzero(examples.labels != NONE_INDEX)
+    for track, label in zip(examples.tracks, examples.labels, strict=True):
+        window: Array32 | None = None
+        if label == NONE_INDEX:
+            window = _of_nothing(track, rng)
+        elif augment and rng.random() < SPLICE_SHARE:
+            before = examples.tracks[int(shapes[rng.integers(len(shapes))])]
+            window = spliced(before, track, rng)
+        if window is None:
+            window = _cut(track, rng)
+        tracks.append(_augmented(window, rng) if augment else window)
+    return tracks
+
+
+def _cut(track: Array32, rng: np.random.Generator) -> Array32:
+    """A window that ends at a random time, and may lack its beginning."""
+    end = len(track)
+    if rng.random() > WHOLE_SHARE:
+        least = SHORTEST_SAMPLES if rng.random() < SHORTER_SHARE else EARLY_SAMPLES
+        if end > least:
+            end = int(rng.integers(least, end + 1))
+    begin = max(0, end - WINDOW_SAMPLES)
+    if rng.random() < HEAD_CUT_SHARE and end - begin > 2 * EARLY_SAMPLES:
+        begin = int(rng.integers(begin, end - 2 * EARLY_SAMPLES))
+    return track[begin:end]
+
+
+def _of_nothing(track: Array32, rng: np.random.Generator) -> Array32:
+    """A window of no primitive, cut at a random time."""
+    end = int(rng.integers(min(SHORTEST_SAMPLES, len(track)), len(track) + 1))
+    window = track[:end]
+    if rng.random() < MOTION_SHARE:
+        motion = window[newest_motion(window, MODEL_RATE_HZ)]
+        if len(motion) >= SHORTEST_SAMPLES:
+            window = motion
+    return window[-WINDOW_SAMPLES:]
 
 
 def _augmented(track: Array32, rng: np.random.Generator) -> Array32:
@@ -133,7 +185,8 @@ def _augmented(track: Array32, rng: np.random.Generator) -> Array32:
     side = -1.0 if rng.random() < MIRROR_SHARE else 1.0
     up = -1.0 if rng.random() < MIRROR_SHARE else 1.0
     scale = rng.uniform(*SCALE)
-    return track * np.array([scale, scale * side, scale * up], dtype=np.float32)
+    # The yaw stick turns the vehicle as far as it does, so it is mirrored but not scaled.
+    return track * np.array([scale, scale * side, scale * up, side], dtype=np.float32)
 
 
 def spliced(before: Array32, after: Array32, rng: np.random.Generator) -> Array32 | None:
@@ -155,5 +208,7 @@ def spliced(before: Array32, after: Array32, rng: np.random.Generator) -> Array3
     turn = math.atan2(into[1], into[0]) - math.atan2(out[1], out[0])
     gain = speeds[1] / speeds[0]
     c, s = gain * math.cos(turn), gain * math.sin(turn)
-    frame = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]], dtype=np.float32)
-    return np.concatenate([before[-share:] @ frame, after[:end]])[-WINDOW_SAMPLES:]
+    frame = np.eye(4, dtype=np.float32)
+    frame[:2, :2] = [[c, s], [-s, c]]
+    joined = np.clip(before[-share:] @ frame, -1.0, 1.0)
+    return np.concatenate([joined, after[:end]])[-WINDOW_SAMPLES:]

@@ -6,18 +6,16 @@ import pytest
 from cli.main import main
 from services.classifier.model import OnnxModel
 from training import train as training
-from training.fit import Epoch
+from training.fit import Budget, Epoch
 from training.labels import PRIMITIVES
+from training.people import Share, people_of
 from training.train import Preset, train
 
 TINY = Preset(
-    operators=10,
-    multiple=0.04,
-    epochs=2,
-    validation_operators=10,
-    validation_multiple=0.03,
-    test_operators=10,
-    test_multiple=0.04,
+    training=Share(wide_people=12, wide=0.03, thesis_people=6, thesis=0.02),
+    validation=Share(wide_people=6, wide=0.02, thesis_people=4, thesis=0.02),
+    test=Share(wide_people=12, wide=0.03, thesis_people=4, thesis=0.02),
+    budget=Budget(windows=450),
 )
 
 
@@ -46,38 +44,77 @@ def _tiny(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(training.PRESETS, "quick", TINY)
 
 
+class Stopped(Told):
+    """Loses its patience after an epoch."""
+
+    def epoch(self, epoch: Epoch, epochs: int) -> None:
+        super().epoch(epoch, epochs)
+        if epoch.number == 2:
+            raise KeyboardInterrupt
+
+
 def test_a_run_leaves_a_model_its_card_and_its_figures(tmp_path: Path) -> None:
     told = Told()
     run = train("quick", 7, tmp_path, told)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["README.md", "intent.json", "intent.onnx"]
     model = OnnxModel(tmp_path / "intent.onnx")
     assert model.name == f"intent-{run.sha256[:8]}"
     assert model.labels == PRIMITIVES
     assert run.parity < 1e-5
     card = (tmp_path / "README.md").read_text()
     assert run.sha256 in card
-    assert "SVM (thesis)" in card
     figures = json.loads((tmp_path / "intent.json").read_text())
-    ours = figures["classifiers"]["CNN-GRU"]
-    assert f"{ours['f1']:.3f}" in card
-    assert sum(map(sum, ours["confusion"])) == ours["count"]
-    assert list(ours["early_f1"]) == ["1.0", "1.5", "2.0", "3.0"]
+    assert set(figures["sets"]) == {"calibrated", "wide"}
+    for found in figures["sets"].values():
+        assert f"{found['f1']:.3f}" in card
+        assert sum(map(sum, found["confusion"])) == found["count"]
+        assert list(found["early_f1"]) == ["1.0", "1.5", "2.0", "3.0"]
+    assert [epoch["number"] for epoch in figures["history"]] == [1, 2, 3]
     assert all(done == total for done, total in told.sets.values())
     assert set(told.sets) == {"training", "validation", "test"}
-    assert len(told.epochs) == 2
+    assert len(told.epochs) == 3
     assert told.batches[-1][0] == told.batches[-1][1]
 
 
-def test_the_same_seed_gives_the_same_file(tmp_path: Path) -> None:
+def test_the_same_seed_gives_the_same_file_stopped_and_resumed_or_not(tmp_path: Path) -> None:
     one = train("quick", 3, tmp_path / "one", Told())
     other = train("quick", 3, tmp_path / "other", Told())
+    with pytest.raises(KeyboardInterrupt):
+        train("quick", 3, tmp_path / "stopped", Stopped())
+    resumed = train("quick", 3, tmp_path / "stopped", told := Told(), resume=True)
+    assert [epoch.number for epoch in told.epochs] == [2, 3]
     different = train("quick", 4, tmp_path / "different", Told())
-    assert one.sha256 == other.sha256 != different.sha256
+    assert one.sha256 == other.sha256 == resumed.sha256 != different.sha256
+
+
+def test_people_are_the_same_in_any_number_of_processes() -> None:
+    share = Share(wide_people=30, wide=0.06, thesis_people=3, thesis=0.01)
+    one, other = people_of("set", share, 5), people_of("set", share, 5, processes=2)
+    assert len(one) == len(other)
+    for a, b in zip(one, other, strict=True):
+        assert (a.label, a.operator) == (b.label, b.operator)
+        assert (a.sticks == b.sticks).all()
+    assert len({a.operator for a in one}) == share.people
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"), [(None, "there is no"), (b"nonsense", "cannot be read")]
+)
+def test_what_cannot_be_resumed_is_one_line(
+    content: bytes | None, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if content is not None:
+        (tmp_path / "intent.checkpoint").write_bytes(content)
+    assert main(["train", "--preset", "quick", "--resume", "--out", str(tmp_path)]) == 1
+    error = capsys.readouterr().err
+    assert len(error.splitlines()) == 1
+    assert reason in error
 
 
 def test_the_command_prints_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["train", "--preset", "quick", "--seed", "1", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
-    for word in ("CNN-GRU", "SVM (thesis)", "interval", "1.5 s", "helix"):
+    for word in ("calibrated", "wide", "1.5 s", "AUROC", "helix"):
         assert word in printed
     assert (tmp_path / "intent.onnx").exists()
 
