@@ -104,7 +104,6 @@ class Simulation:
         self._config = config
         self._start_ns = start_ns
         self._count = 0
-        self._told: tuple[str, int] | None = None
         # Half a period apart, so that the two cameras do not ask for the renderer at once.
         self._shutters = [
             _Shutter(camera.topic, camera.fps, phase)
@@ -161,33 +160,36 @@ class Simulation:
             command: what has arrived since the last step, if anything.
         """
         count = self._count
-        command = self._command_link.step(command)
+        if self._command_link is not None:
+            command = self._command_link.step(command)
         if self._wind is not None and count % _WIND_EVERY == 0:
             self._air_mps = self._wind.step(self._state.position_m, self._state.velocity_mps)
-        was = self._state
-        loads = self._vehicle.control(command, was, self._touch, self._below_m, self._air_mps)
+        was, vehicle = self._state, self._vehicle
+        loads = vehicle.control(command, was, self._touch, self._below_m, self._air_mps)
         self._stage.step(loads, was)
         self._count = count = count + 1
         self._state = state = self._stage.state()
         self._touch = self._stage.touch(state)
 
-        now_ns = self.now_ns
+        now_ns = self._start_ns + count * STEP_NS
         told: list[tuple[str, m.Message]] = [("imu", self._imu.sample(now_ns, state))]
         if count % _ALTIMETER_EVERY == 0:
             told.append(("altimeter", self._altimeter.sample(now_ns, self._look_down())))
-        elif self._vehicle.state != "flying":
+        elif vehicle.state != "flying":
             self._look_down()
-        news = (self._vehicle.state, self._vehicle.collisions)
-        if news != self._told or count % _STATUS_EVERY == 0:
-            self._told = news
+        if vehicle.has_news or count % _STATUS_EVERY == 0:
+            vehicle.has_news = False
             told.append(("vehicle", self.status()))
-        messages = self._sensor_link.step(told)
+        if self._sensor_link is not None:
+            told = self._sensor_link.step(told)
         if count % _TRUTH_EVERY == 0:
-            messages = [*messages, ("truth", sensors.truth(now_ns, state))]
+            told.append(("truth", sensors.truth(now_ns, state)))
+        if not self._shutters:
+            return Step(told, ())
         shots = [
             self._shot(shutter, was) for shutter in self._shutters if shutter.next_step <= count
         ]
-        return Step(messages, self._video_link.step(shots))
+        return Step(told, self._video_link.step(shots))
 
     def reset(self, request: m.ResetRequest) -> m.VehicleStatus:
         """Start anew in place; stamps go on.
@@ -272,12 +274,13 @@ class Simulation:
             battery=config.battery,
             ceiling_m=config.ceiling_m,
         )
-        self._told = None
-        self._command_link: Delay[m.Command | None] = Delay(_steps(config.command_delay_s), None)
-        self._sensor_link: Delay[list[tuple[str, m.Message]]] = Delay(
-            _steps(config.sensor_delay_s), []
-        )
-        self._video_link: Delay[list[Shot]] = Delay(_steps(config.video_delay_s), [])
+        self._command_link: Delay[m.Command | None] | None = None
+        self._sensor_link: Delay[list[tuple[str, m.Message]]] | None = None
+        if config.command_delay_s > 0.0:
+            self._command_link = Delay(_steps(config.command_delay_s), lambda: None)
+        if config.sensor_delay_s > 0.0:
+            self._sensor_link = Delay(_steps(config.sensor_delay_s), list)
+        self._video_link: Delay[list[Shot]] = Delay(_steps(config.video_delay_s), list)
 
     def _look_down(self) -> float:
         """What the altimeter would measure; notes what is right below."""

@@ -55,7 +55,7 @@ class Touch:
     body: bool = False
 
 
-_NOTHING = Touch()
+UNTOUCHED = Touch()
 
 
 class Stage:
@@ -181,11 +181,11 @@ class Stage:
         vx, vy, vz = state.velocity_mps
         self._leash_m -= (abs(vx) + abs(vy) + abs(vz)) * self._step_s
         if self._leash_m > 0.0:
-            return _NOTHING
+            return UNTOUCHED
         clearance_m = self._clearance_m(state.position_m)
         if clearance_m > _MARGIN_M:
             self._leash_m = clearance_m
-            return _NOTHING
+            return UNTOUCHED
         points = pybullet.getContactPoints(bodyA=self._vehicle, **self._on)
         # Near misses are listed too; only what pushes back is touched.
         touched = {point[2] for point in points if point[9] > 0.0}

@@ -1,12 +1,14 @@
 """The vehicle: its states from landed to flying, the watchdog on commands, battery, collisions."""
 
+import math
+
 import numpy as np
 
 from common.messages import Command, VehicleState
 from common.topics import TOPICS
 from services.sim.body import WEIGHT_N, BodyState, Loads, Sticks, Vector3
 from services.sim.plants.plant import Plant
-from services.sim.stage import Touch
+from services.sim.stage import UNTOUCHED, Touch
 
 WATCHDOG_S = TOPICS["command"].max_age_s
 """A command older than this is worthless: the vehicle hovers."""
@@ -15,8 +17,8 @@ TAKE_OFF_HEIGHT_M = 0.5
 """Here a take-off is over (tum_simulator a020d89). It stops its rotors 0.2 m up or after 5 s of
 landing; here they stop on touching down, since a real drone is not dropped."""
 
-CAPSIZED_RAD = 1.4
-"""Tilted beyond this the rotors stop, as the real drone's do."""
+CAPSIZED_COS = math.cos(1.4)
+"""Tilted beyond 1.4 rad the rotors stop, as the real drone's do."""
 STILL_MPS = 0.05
 COLLISION_GAP_S = 0.25
 """A contact is a new collision after this long without one: a scrape along a fence is one."""
@@ -104,6 +106,8 @@ class Vehicle:
         self._apart_s = COLLISION_GAP_S
         self.state: VehicleState = "flying" if flying else "landed"
         self.collisions = 0
+        self.has_news = True
+        """Set when the state or the collisions change."""
         self.battery = battery
         """What is left, 0..1."""
 
@@ -124,10 +128,16 @@ class Vehicle:
             below_m: the distance from the body's origin to what is below.
             wind_mps: of the air, world.
         """
+        was = self.state
         self._listen(command, state, touch)
         self._move_on(state, touch, below_m)
-        self._count_collisions(touch)
         now = self.state
+        if touch is UNTOUCHED:
+            self._apart_s += self._step_s
+        else:
+            self._count_collisions(touch)
+        if now != was:
+            self.has_news = True
         if now == "landed" or now == "emergency":
             self._plant.restart()
             return self._plant.fall(state, wind_mps)
@@ -168,7 +178,7 @@ class Vehicle:
         now = self.state
         if now == "landed" or now == "emergency":
             return
-        if state.tilt_rad > CAPSIZED_RAD or self.battery == 0.0:
+        if state.rotation[8] < CAPSIZED_COS or self.battery == 0.0:
             self.state = "emergency"
         elif now == "landing":
             if (touch.ground or touch.body) and below_m < 0.2:
@@ -185,6 +195,7 @@ class Vehicle:
             return
         if self._apart_s >= COLLISION_GAP_S:
             self.collisions += 1
+            self.has_news = True
         self._apart_s = 0.0
 
 

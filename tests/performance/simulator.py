@@ -1,0 +1,348 @@
+"""`make bench-simulator`: how fast the simulator is, beside what others use, in one run.
+
+What is compared is measured in turns, so that a busy moment of the machine meets both; a figure is
+the median of its turns.
+"""
+
+import argparse
+import json
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+from bench import Row, fly
+from peers import PEER_HZ, PeerPhysics, egl_camera, tiny_camera
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+import worlds
+from cli import launch
+from common import messages as m
+from common.clock import SystemClock, seconds
+from common.node import Node
+from common.topics import SERVICES, TOPICS
+from common.zenoh_bus import ZenohBus
+from services.autopilot.config import Config as AutopilotConfig
+from services.autopilot.core import Autopilot
+from services.classifier.config import Config as ClassifierConfig
+from services.classifier.core import Classifier
+from services.classifier.model import OnnxModel
+from services.localizer.config import Config as LocalizerConfig
+from services.localizer.core import Localizer
+from services.operator.pilot import Person, Pilot
+from services.operator.route import route_of
+from services.sim.cameras import Camera, Shot, cameras_of
+from services.sim.config import Config
+from services.sim.core import PHYSICS_HZ, STEP_S, Simulation
+from services.sim.optics import Renderer
+from services.sim.stage import Stage
+from services.sim.studio import open_renderer, photograph
+from services.synthesis.config import Config as SynthesisConfig
+from services.synthesis.core import Synthesizer
+from studies.lockstep import Darkroom, HandsOff, Lockstep
+
+TURNS = 15
+LAPS = 40
+"""Places along the track from which cameras are compared."""
+COMMAND = m.Command(stamp=0, seq=0, vx=0.1, vy=0.0, vz=0.0, wz=0.0, action="fly", mode="manual")
+SOAK_DRIFT_MS = 5.0
+
+
+@dataclass(frozen=True)
+class Contender:
+    """One of those that are compared.
+
+    Attributes:
+        name: for people.
+        work: one turn of it.
+        units: what a turn gets done, in s of simulated time or in pictures.
+    """
+
+    name: str
+    work: Callable[[], None]
+    units: float
+
+
+def in_turns(contenders: list[Contender], turns: int, progress: Progress) -> dict[str, float]:
+    """Units a second of each, the median of its turns."""
+    clock = SystemClock()
+    task = progress.add_task(", ".join(each.name for each in contenders)[:60], total=turns)
+    rates: dict[str, list[float]] = {each.name: [] for each in contenders}
+    for _ in range(turns):
+        for each in contenders:
+            begin_ns = clock.monotonic_ns()
+            each.work()
+            rates[each.name].append(each.units / seconds(clock.monotonic_ns() - begin_ns))
+        progress.advance(task)
+    return {name: float(np.median(values)) for name, values in rates.items()}
+
+
+def physics(progress: Progress) -> list[Row]:
+    """Physics and sensors without pictures, in process, beside gym-pybullet-drones' loop."""
+    contenders: list[Contender] = []
+    duration_s = 10.0
+    for world in ("empty", "track"):
+        for plant in ("tum", "ardrone"):
+            config = Config(world=world, plant=plant, renderer="none")  # type: ignore[arg-type]
+            simulation = Simulation(config)
+
+            def ours(simulation: Simulation = simulation) -> None:
+                simulation.reset(m.ResetRequest(position=(0.0, 0.0, 1.0)))
+                for count in range(round(duration_s * PHYSICS_HZ)):
+                    simulation.step(COMMAND if count % 4 == 0 else None)
+
+            contenders.append(Contender(f"{plant} in {world}", ours, duration_s))
+    for name, drag in (("peer", False), ("peer with drag", True)):
+        peer = PeerPhysics(drag)
+
+        def theirs(peer: PeerPhysics = peer) -> None:
+            for _ in range(round(duration_s * PEER_HZ)):
+                peer.step()
+
+        contenders.append(Contender(name, theirs, duration_s))
+    rates = in_turns(contenders, TURNS, progress)
+    rows = [
+        Row(f"physics and sensors, {each.name} (x real time)", rates[each.name], 200.0, ">= 200")
+        for each in contenders
+        if not each.name.startswith("peer")
+    ]
+    for name in ("peer", "peer with drag"):
+        ours_s = rates["ardrone in empty"]
+        text = f"over gym-pybullet-drones' loop{name.removeprefix('peer')}, x {rates[name]:.0f}"
+        rows.append(Row(text, ours_s, rates[name], "ratio >= 1"))
+    return rows
+
+
+def chain(duration_s: float, progress: Progress) -> list[Row]:
+    """The whole flight chain in lock-step, without pictures: the scripted operator on the track."""
+    config = Config(renderer="none")
+
+    def fly_on() -> float:
+        simulation = Simulation(config)
+        route = route_of(worlds.load("track"))
+        lockstep = Lockstep(
+            simulation,
+            HandsOff(),
+            autopilot=Autopilot(AutopilotConfig(), 0),
+            classifier=Classifier(ClassifierConfig(), OnnxModel(Path(ClassifierConfig().model))),
+            synthesizer=Synthesizer(SynthesisConfig()),
+        )
+        lockstep.seat(Pilot(route, Person(seed=1), 0.02))
+        clock = SystemClock()
+        begin_ns = clock.monotonic_ns()
+        lockstep.run(duration_s)
+        return duration_s / seconds(clock.monotonic_ns() - begin_ns)
+
+    task = progress.add_task("whole chain in lock-step", total=3)
+    factors = []
+    for _ in range(3):
+        factors.append(fly_on())
+        progress.advance(task)
+    figure = "whole chain in lock-step, no pictures (x real time)"
+    return [Row(figure, float(np.median(factors)), 50.0, ">= 50")]
+
+
+def localized(duration_s: float, progress: Progress) -> list[Row]:
+    """Lock-step with both cameras' pictures, 640x360 and QVGA, and the localizer."""
+    config = Config(world="track")
+    simulation = Simulation(config)
+    darkroom = Darkroom(simulation, config)
+    lockstep = Lockstep(
+        simulation,
+        HandsOff(),
+        autopilot=Autopilot(AutopilotConfig(), 0),
+        localizer=Localizer(LocalizerConfig()),
+        darkroom=darkroom,
+    )
+    counts = {"camera/front": 0, "camera/down": 0}
+
+    def count(topic: str) -> Callable[[m.Image, int], None]:
+        def add(_picture: m.Image, _now_ns: int) -> None:
+            counts[topic] += 1
+
+        return add
+
+    for topic in counts:
+        lockstep.listen(topic, count(topic))
+    lockstep.run(1.0)
+    lockstep.decide("takeoff")
+    task = progress.add_task("lock-step with pictures and localizer", total=1)
+    clock = SystemClock()
+    begin_ns = clock.monotonic_ns()
+    lockstep.run(duration_s)
+    factor = duration_s / seconds(clock.monotonic_ns() - begin_ns)
+    progress.advance(task)
+    darkroom.close()
+    assert counts["camera/front"] >= 30 * duration_s, counts
+    assert counts["camera/down"] >= 60 * duration_s, counts
+    figure = "lock-step with 640x360, QVGA and localizer (x real time)"
+    return [Row(figure, factor, 5.0, ">= 5")]
+
+
+def cameras(progress: Progress) -> list[Row]:
+    """Pictures of the track a second: ours encoded and published, pybullet's as they come."""
+    world = worlds.load("track")
+    stage = Stage(world, STEP_S)
+    scene = stage.scene()
+    stage.close()
+    places = world.ideal_path_m[:: max(1, len(world.ideal_path_m) // LAPS)]
+    ahead = np.roll(places, -1, axis=0) - places
+    shots = []
+    for (x, y, z), (dx, dy, _) in zip(places, ahead, strict=True):
+        half = np.arctan2(dy, dx) / 2.0
+        turn = (0.0, 0.0, float(np.sin(half)), float(np.cos(half)))
+        shots.append(Shot("camera/front", 0, (float(x), float(y), float(z)), turn))
+    rows: list[Row] = []
+    renderer = open_renderer("auto")
+    renderer.load(scene)
+    peers: dict[str, Callable[[Camera, Shot], Any]] = {"TinyRenderer": tiny_camera(scene)}
+    try:
+        peers["EGL plugin"] = egl_camera(scene)
+    except OSError as error:
+        Console(stderr=True).print(f"without pybullet's EGL plugin: {error}")
+    with launch.running((), {}) as system:
+        node = Node(ZenohBus(system.endpoint), system.vehicle, "sim")
+        node.publishes("camera/front")
+        for size in ("360p", "720p"):
+            camera = cameras_of(Config(front_size=size))[0]  # type: ignore[arg-type]
+            rows += _compare(camera, shots, renderer, peers, node, progress)
+        node.close()
+    renderer.close()
+    return rows
+
+
+def _compare(
+    camera: Camera,
+    shots: list[Shot],
+    renderer: Renderer,
+    peers: dict[str, Callable[[Camera, Shot], Any]],
+    node: Node,
+    progress: Progress,
+) -> list[Row]:
+    size = f"{camera.lens.width}x{camera.lens.height}"
+
+    def ours() -> None:
+        for shot in shots:
+            node.publish("camera/front", photograph(renderer, camera, shot, 80))
+
+    contenders = [Contender(f"{renderer.name}, {size}", ours, len(shots))]
+    for name, draw in peers.items():
+
+        def theirs(draw: Callable[[Camera, Shot], Any] = draw) -> None:
+            # A few are enough of what is slow.
+            for shot in shots[:: len(shots) // 4]:
+                draw(camera, shot)
+
+        contenders.append(Contender(name, theirs, len(shots[:: len(shots) // 4])))
+    rates = in_turns(contenders, 5, progress)
+    mine = rates[contenders[0].name]
+    rows = [Row(f"{size}, encoded and published (fps)", mine, 30.0)]
+    for name, bar in (("EGL plugin", 8), ("TinyRenderer", 20)):
+        if name in rates:
+            figure = f"{size} over pybullet's {name}, {rates[name]:.1f} fps raw"
+            rows.append(Row(figure, mine, rates[name], f"ratio >= {bar}"))
+    return rows
+
+
+def everything(duration_s: float, progress: Progress) -> list[Row]:
+    """The drone's own cameras, 1280x720 and QVGA, with every service running."""
+    settings = {
+        "sim": {"world": "track", "front_size": "720p"},
+        "overlay": {"console_port": str(launch.free_port())},
+        "operator": {"source": "scripted", "laps": "0"},
+    }
+    bars = {"real-time factor": 0.99, "camera/front (Hz)": 29.0, "camera/down (Hz)": 57.0}
+    bars |= {f"{topic} (Hz)": 0.98 * (TOPICS[topic].rate_hz or 0.0) for topic in ("imu", "truth")}
+    with launch.running(SERVICES, settings) as system:
+        rows = fly(system, duration_s, progress)
+    return [
+        Row(f"720p, all services: {row.figure}", row.value, row.baseline, _bar(bars, row.figure))
+        for row in rows
+    ]
+
+
+def _bar(bars: dict[str, float], figure: str) -> str:
+    return f">= {bars[figure]:g}" if figure in bars else ""
+
+
+def soak(duration_s: float, progress: Progress) -> list[Row]:
+    """Real time for long: memory that grows, stamps that leave the wall clock."""
+    clock = SystemClock()
+    settings = {"sim": {"world": "track"}}
+    with launch.running(("sim",), settings) as system:
+        node = Node(ZenohBus(system.endpoint), system.vehicle, "bench")
+        lags_ms: list[float] = []
+
+        def on_imu(imu: m.Imu, _arrival_ns: int) -> None:
+            lags_ms.append((clock.utc_ns() - imu.stamp) / 1e6)
+
+        node.on("imu", on_imu, depth=256)
+        stop = threading.Event()
+        process = psutil.Process(system.processes["sim"].pid)
+        task = progress.add_task(f"{duration_s:.0f} s of real time", total=duration_s)
+        begin_ns = clock.monotonic_ns()
+        memory: list[float] = []
+        ends: list[float] = []
+        while (passed_s := seconds(clock.monotonic_ns() - begin_ns)) < duration_s:
+            node.spin()
+            stop.wait(0.01)
+            if passed_s > 15.0 and len(memory) < passed_s - 15.0:
+                memory.append(process.memory_info().rss / 2**20)
+                ends.append(float(np.median(lags_ms[-200:])))
+                progress.update(task, completed=passed_s)
+        system.check()
+        node.close()
+    tenth = max(1, len(memory) // 10)
+    grown = float(np.median(memory[-tenth:]) - np.median(memory[:tenth]))
+    drift = float(np.median(ends[-tenth:]) - np.median(ends[:tenth]))
+    share = f"{duration_s / 60.0:.0f} min"
+    return [
+        Row(f"memory of the simulator after {share} (MB)", memory[-1], memory[0]),
+        Row("its growth from the first tenth to the last (MB)", grown, 1.0, "about 0"),
+        Row("stamps against the wall clock, drift (ms)", drift, SOAK_DRIFT_MS, "within 5"),
+    ]
+
+
+PARTS: dict[str, Callable[[argparse.Namespace, Progress], list[Row]]] = {
+    "physics": lambda _options, progress: physics(progress),
+    "chain": lambda options, progress: chain(options.seconds, progress),
+    "localized": lambda options, progress: localized(options.seconds / 2.0, progress),
+    "cameras": lambda _options, progress: cameras(progress),
+    "everything": lambda options, progress: everything(options.seconds, progress),
+    "soak": lambda options, progress: soak(options.soak, progress),
+}
+
+
+def main() -> None:
+    """Run the bench and print its table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(PARTS)} (all)")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of flights (60)")
+    parser.add_argument("--soak", type=float, default=600.0, help="seconds of real time (600)")
+    parser.add_argument("--output", type=Path, help="also write the rows as JSON")
+    options = parser.parse_args()
+    unknown = set(options.parts) - set(PARTS)
+    if unknown:
+        parser.error(f"{', '.join(sorted(unknown))}: use {', '.join(PARTS)}")
+    rows: list[Row] = []
+    with Progress(console=Console(stderr=True)) as progress:
+        for part in options.parts or PARTS:
+            rows += PARTS[part](options, progress)
+    table = Table("figure", "measured", "baseline", "ratio", "target")
+    for row in rows:
+        ratio = row.value / row.baseline
+        table.add_row(
+            row.figure, f"{row.value:.3f}", f"{row.baseline:g}", f"{ratio:.2f}", row.target
+        )
+    Console().print(table)
+    if options.output:
+        options.output.write_text(json.dumps([vars(row) for row in rows], indent=1))
+
+
+if __name__ == "__main__":
+    main()
