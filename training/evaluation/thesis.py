@@ -62,7 +62,7 @@ class ThesisMachine:
         return np.asarray(self._machine.decision_function(rows))
 
 
-class _Network(nn.Module):
+class Network(nn.Module):
     """Figure 4.2: batch norm, four convolutions, dropout, two GRUs, dropout, softmax.
 
     Numbers of filters, their sizes and strides are not in the thesis; these are ours.
@@ -123,7 +123,7 @@ class ThesisNetwork:
         """Train for `epochs`, or until the held loss no longer falls; the epoch that was best."""
         torch.manual_seed(seed)
         rng = np.random.default_rng(seed)
-        self._network = _Network(len(PRIMITIVES))
+        self._network = Network(len(PRIMITIVES))
         counts = np.bincount(labels, minlength=len(PRIMITIVES))
         weights = torch.tensor(len(labels) / (len(counts) * counts), dtype=torch.float32)
         loss_of = nn.CrossEntropyLoss(weights)
