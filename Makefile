@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --disable-pip-version-check -c constraints.t
 SCRIPTS := .ci/run deploy/install
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo up check test test-compose bench fits flight properties train evaluate picture lock docs format clean
+.PHONY: help setup demo up check test test-compose bench fits flight properties people train evaluate picture lock docs format clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -83,6 +83,9 @@ flight: setup $(VENV)/.all ## how closely paths are flown, against other control
 
 properties: setup $(VENV)/.all ## the autopilot's rules in 100 000 random steps, in two minutes
 	$(BIN)/python -m pytest tests/unit/autopilot/test_autopilot_properties.py -m slow $(ARGS)
+
+people: setup $(VENV)/.all ## the thesis' SVM on the simulated operators scores as in the thesis
+	$(BIN)/python -m pytest tests/unit/training/test_training_generator_calibration.py -m slow $(ARGS)
 
 train: $(VENV)/.all ## train the model anew into models/
 	$(BIN)/autocomplete train $(ARGS)

@@ -1,4 +1,5 @@
 from dataclasses import asdict, fields
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -152,6 +153,25 @@ def test_every_habit_has_a_unit_a_range_and_a_source() -> None:
         assert low <= high
         assert habit.metadata["unit"]
         assert habit.metadata["source"]
+
+
+def test_the_page_about_people_says_what_the_code_has() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "people.md").read_text()
+    for habit in fields(People):
+        low, high = habit.metadata["range"]
+        span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+        ending = f"| {habit.metadata['unit']} | {span} | {habit.metadata['source']} |"
+        assert [
+            line
+            for line in page.splitlines()
+            if line.startswith(f"| `{habit.name}` |") and line.endswith(ending)
+        ], habit.name
+    for name, trait in TRAITS.items():
+        spans = ", ".join(f"`{key}` {low:g} to {high:g}" for key, (low, high) in trait.items())
+        assert f"| {name} | {spans} |" in page
+    for family in FAMILIES:
+        assert f"| {family.name} | {family.style.value} | {', '.join(family.traits)}" in page
+    assert f"difficulty {THESIS.difficulty}" in page
 
 
 def test_there_are_hands_and_pilots() -> None:
