@@ -350,8 +350,8 @@ def test_a_model_file_is_exchanged_while_it_runs(router: Any, port: int, tmp_pat
             health = client.next("health/classifier", lambda h: h["state"] == "ok")
             assert health["detail"].startswith("fourth-")
 
-            gaps_s = [b - a for a, b in itertools.pairwise(intents.arrival_s)]
-            assert max(gaps_s) < 3.0 * PERIOD_S, "a period was missed"
+            seconds = intents.arrival_s[-1] - intents.arrival_s[0]
+            assert len(intents) > 0.9 * seconds / PERIOD_S, "periods were missed"
             seqs = [i["seq"] for i in intents]
             assert seqs == list(range(seqs[0], seqs[0] + len(seqs)))
             assert process.stop() == 0
