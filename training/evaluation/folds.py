@@ -35,7 +35,7 @@ class Size:
         wide: of the wide population, to learn from; a sixth as many to choose by.
         thesis: of the calibrated one, likewise.
         none: performances of nothing, as a share of those of primitives.
-        tested: of each population that is judged on; half as many of each family left out.
+        tested: of each population that is judged on; a third as many of each family left out.
         hovering_people: who hold a place for 60 s.
         budget: windows that our network is shown in all.
     """
@@ -52,7 +52,7 @@ class Size:
 
 
 SIZES = {
-    "full": Size(150, 1.5, 48, 0.6, 0.25, 24, 0.25, 20, EVALUATION.windows),
+    "full": Size(150, 1.5, 48, 0.6, 0.25, 24, 0.2, 20, EVALUATION.windows),
     "quick": Size(24, 0.08, 12, 0.05, 0.25, 8, 0.04, 2, 10_000),
 }
 VALIDATION_SHARE = 1 / 6
@@ -142,7 +142,7 @@ def fold(seed: int, size: Size, tell: Callable[[int, int], None]) -> Fold:
     tests[KNOWN] = made("o", size.tested_people, size.tested, wide)
     for family in out:
         tests[FAMILY + family.name] = made(
-            "f", size.tested_people // 2, size.tested / 2, Population("wide", (family,))
+            "f", size.tested_people // 2, size.tested / 3, Population("wide", (family,))
         )
     nothing = {NONE: len(tests[KNOWN])}
     none = populate(Population("wide", FAMILIES), size.tested_people, nothing, next(seeds))

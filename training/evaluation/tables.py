@@ -48,7 +48,7 @@ def is_met(cell: str) -> bool | None:
     """Whether a cell is a verdict, and which."""
     if cell == "met" or cell.startswith("met "):
         return True
-    return False if cell.startswith(("short", "not met")) else None
+    return False if cell.startswith(("short", "over", "not met")) else None
 
 
 def _mark(cell: str) -> str:

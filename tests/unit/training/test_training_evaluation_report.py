@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from cli.main import main
 from common.clock import ManualClock, nanoseconds
 from services.classifier.model import Answer
 from training.dataset.primitive import Primitive
@@ -117,7 +118,7 @@ def test_latency_is_that_of_single_windows() -> None:
 def test_verdicts_say_by_how_much_a_bar_is_missed() -> None:
     assert at_least(0.97, 0.97) == "met"
     assert at_least(0.95, 0.97) == "short by 0.020"
-    assert at_most(3.1, 2.0, 1) == "short by 1.1"
+    assert at_most(3.1, 2.0, 1) == "over by 1.1"
 
 
 def result(right: float, families: list[str]) -> dict:
@@ -183,3 +184,10 @@ def test_a_report_needs_no_network_of_ours(tmp_path) -> None:
     assert [table.title for table in write(found, tmp_path)][1] == (
         "Classifiers, at the end of a primitive"
     )
+
+
+def test_an_unknown_classifier_is_refused_in_one_line(capsys, tmp_path) -> None:
+    assert main(["evaluate", "--models", "nobody", "--out", str(tmp_path / "e")]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "'nobody': use cnn-gru, " in error
