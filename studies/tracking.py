@@ -32,7 +32,8 @@ RADIUS_M = 2.0
 SETTLED_M = 0.1
 SETTLED_MPS = 0.15
 START_LIMIT_S = 25.0
-FLIGHT_LIMIT_S = 200.0
+FLIGHT_LIMIT_S = 100.0
+"""By then 15 m are flown at 0.15 m/s, the slowest that the autopilot plans."""
 RATE_HZ = 50
 PICTURES_HZ = 30.0
 """As many as the localizer looks at."""

@@ -1,7 +1,6 @@
 """The last look at every command: finite, within full stick, in order, from a live sender."""
 
 import math
-from dataclasses import astuple
 
 from common.clock import seconds
 from common.messages import Command, CommandAction, FlightMode
@@ -50,7 +49,7 @@ class Guard:
             now_ns: monotonic time.
             live: whether sticks still arrive; without them nothing moves.
         """
-        wanted = astuple(sticks)
+        wanted = (sticks.vx, sticks.vy, sticks.vz, sticks.wz)
         finite = all(map(math.isfinite, wanted))
         allowed = wanted if finite and (live or not any(wanted)) else (0.0,) * len(wanted)
         axes: tuple[float, ...] = tuple(max(-1.0, min(1.0, axis)) for axis in allowed)

@@ -72,6 +72,16 @@ class Path:
         """Change of the yaw a metre at the samples, (N,)."""
         self.curvatures_1pm = self._smooth(np.diff(self._tangents, axis=0) / self.spacing_m)
         """Curvature vectors at the samples, towards the inside of the turn, (N, 3)."""
+        # As lists: single places are asked for 250 times a second, where numpy is slow.
+        self._rows: list[list[float]] = np.column_stack(
+            [
+                self._points,
+                self._tangents,
+                self.curvatures_1pm,
+                self._yaws_rad,
+                self.yaw_rates_radpm,
+            ]
+        ).tolist()
 
     @property
     def points_m(self) -> Array:
@@ -90,19 +100,20 @@ class Path:
         else:
             laps, within = 0.0, min(max(distance_m, 0.0), self.length_m)
         position = within / self.spacing_m
-        low = min(int(position), len(self._points) - 2)
+        low = min(int(position), len(self._rows) - 2)
         share = position - low
-        point = self._points[low] * (1.0 - share) + self._points[low + 1] * share
-        tangent = self._tangents[low] * (1.0 - share) + self._tangents[low + 1] * share
-        norm = math.sqrt(float(tangent @ tangent)) or 1.0
-        yaw = self._yaws_rad[low] * (1.0 - share) + self._yaws_rad[low + 1] * share
-        turning = self.curvatures_1pm[low] * (1.0 - share) + self.curvatures_1pm[low + 1] * share
+        keep = 1.0 - share
+        x, y, z, tx, ty, tz, cx, cy, cz, yaw, turn = (
+            one * keep + other * share
+            for one, other in zip(self._rows[low], self._rows[low + 1], strict=True)
+        )
+        norm = math.sqrt(tx * tx + ty * ty + tz * tz) or 1.0
         return PathState(
-            (float(point[0]), float(point[1]), float(point[2])),
-            (float(tangent[0]) / norm, float(tangent[1]) / norm, float(tangent[2]) / norm),
-            (float(turning[0]), float(turning[1]), float(turning[2])),
-            float(yaw) + laps * self._yaw_turn_rad,
-            float(self.yaw_rates_radpm[low]),
+            (x, y, z),
+            (tx / norm, ty / norm, tz / norm),
+            (cx, cy, cz),
+            yaw + laps * self._yaw_turn_rad,
+            turn,
         )
 
     def nearest_start_m(self, position_m: Sequence[float], limit_m: float) -> float:
@@ -117,15 +128,20 @@ class Path:
 
     def advanced_m(self, distance_m: float, position_m: Sequence[float]) -> float:
         """The distance of the nearest point a little ahead of `distance_m`; never goes back."""
-        count = len(self._points) - 1
+        rows, count = self._rows, len(self._rows) - 1
         low = math.floor(distance_m / self.spacing_m)
-        ahead = np.arange(low, low + int(SEARCH_AHEAD_M / self.spacing_m) + 1)
-        ahead = ahead if self.closed else ahead[ahead <= count]
-        if not ahead.size:
+        end = low + int(SEARCH_AHEAD_M / self.spacing_m) + 1
+        ahead = range(low, end if self.closed else min(end, count + 1))
+        if not ahead:
             return distance_m
-        nodes = self._points[ahead % count] if self.closed else self._points[ahead]
-        index = int(ahead[np.argmin(np.linalg.norm(nodes - np.asarray(position_m), axis=1))])
-        return max(distance_m, self._refined(index * self.spacing_m, position_m))
+        px, py, pz = position_m
+        best, least = low, math.inf
+        for index in ahead:
+            x, y, z, *_ = rows[index % count] if self.closed else rows[index]
+            square = (x - px) ** 2 + (y - py) ** 2 + (z - pz) ** 2
+            if square < least:
+                best, least = index, square
+        return max(distance_m, self._refined(best * self.spacing_m, position_m))
 
     def _refined(self, distance_m: float, position_m: Sequence[float]) -> float:
         here = self.at(distance_m)
