@@ -52,7 +52,7 @@ class Size:
 
 
 SIZES = {
-    "full": Size(150, 1.5, 48, 0.6, 0.25, 24, 0.2, 20, EVALUATION.windows),
+    "full": Size(200, 3.0, 80, 1.2, 0.25, 24, 0.25, 20, EVALUATION.windows),
     "quick": Size(24, 0.08, 12, 0.05, 0.25, 8, 0.04, 2, 10_000),
 }
 VALIDATION_SHARE = 1 / 6

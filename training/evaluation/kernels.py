@@ -19,7 +19,7 @@ from sklearn.ensemble import ExtraTreesClassifier
 
 from training.evaluation.contender import Lesson, Scores, Tell
 from training.evaluation.ridge import Ridge
-from training.evaluation.views import padded
+from training.evaluation.views import padded, thinned
 from training.labels import PRIMITIVES
 from training.windows import Windows
 
@@ -27,7 +27,6 @@ Array32 = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 
 EVERY_SAMPLES = 2
-EVERY_WINDOWS = 3
 BATCH = 2000
 """Series transformed at once: MultiRocket's features of more do not fit into a small memory."""
 QUANT_TREES = 200
@@ -36,8 +35,8 @@ QUANT_TREES = 200
 
 def _lesson(windows: Windows, full_yaw_radps: float) -> tuple[Array32, IntArray]:
     """Series to learn from, and their labels."""
-    series = padded(windows, full_yaw_radps, EVERY_SAMPLES)
-    return series[::EVERY_WINDOWS], windows.labels[::EVERY_WINDOWS]
+    some = thinned(windows)
+    return padded(some, full_yaw_radps, EVERY_SAMPLES), some.labels
 
 
 class Rocket:

@@ -11,7 +11,7 @@ from sklearn.svm import SVC
 from torch import Tensor, nn
 
 from training.evaluation.contender import Lesson, Scores, Tell
-from training.evaluation.views import in_start_frame, padded
+from training.evaluation.views import in_start_frame, padded, thinned
 from training.labels import PRIMITIVES
 from training.svm import GAMMA, POINTS, C
 from training.windows import Windows
@@ -25,7 +25,7 @@ STRIDES = (2, 2, 1, 1)
 DROPOUT = 0.3
 BATCH = 128
 LEARNING_RATE = 1e-3
-EPOCHS, PATIENCE_EPOCHS = 10, 3
+EPOCHS, PATIENCE_EPOCHS = 16, 3
 
 
 def machine_rows(windows: Windows, full_yaw_radps: float) -> NDArray[np.float64]:
@@ -52,8 +52,9 @@ class ThesisMachine:
     def fit(self, lesson: Lesson, _seed: int, tell: Tell) -> None:
         """Learn from the windows."""
         self._yaw_radps = lesson.full_yaw_radps
+        some = thinned(lesson.windows)
         self._machine = machine()
-        self._machine.fit(machine_rows(lesson.windows, self._yaw_radps), lesson.windows.labels)
+        self._machine.fit(machine_rows(some, self._yaw_radps), some.labels)
         tell(1, 1)
 
     def scores(self, windows: Windows) -> Scores:
@@ -96,9 +97,9 @@ class ThesisNetwork:
     def fit(self, lesson: Lesson, seed: int, tell: Tell) -> None:
         """Learn, note the best epoch, learn again from training and validation people."""
         self._yaw_radps = lesson.full_yaw_radps
-        series = padded(lesson.windows, self._yaw_radps)
-        held = padded(lesson.held, self._yaw_radps)
-        labels, held_labels = lesson.windows.labels, lesson.held.labels
+        some, other = thinned(lesson.windows), thinned(lesson.held)
+        series, held = padded(some, self._yaw_radps), padded(other, self._yaw_radps)
+        labels, held_labels = some.labels, other.labels
         epochs, self.history = self._train(
             series, labels, seed, EPOCHS, lambda done, of: tell(done, 2 * of), held, held_labels
         )

@@ -9,6 +9,16 @@ from training.windows import Windows
 Array32 = NDArray[np.float32]
 
 
+EVERY_WINDOWS = 3
+
+
+def thinned(windows: Windows) -> Windows:
+    """Every third window, for classifiers that would learn for too long from all of them."""
+    some = slice(None, None, EVERY_WINDOWS)
+    sticks, times_s = windows.sticks[some], windows.times_s[some]
+    return Windows(sticks, times_s, windows.lengths[some], windows.labels[some])
+
+
 def in_start_frame(windows: Windows, full_yaw_radps: float) -> Array32:
     """Sticks (n, T, 3) vx vy vz in the frame of the heading at each window's start.
 
