@@ -20,10 +20,11 @@ from common.messages import (
 from common.topics import TOPICS
 from services.synthesis.config import Config
 from services.synthesis.continuation import Vehicle, continue_from, heading_sector
+from services.synthesis.extension import extended_shape
 from services.synthesis.fitting import check, fit, inflation, newest_motion, trust
 from services.synthesis.history import CELL_M, History, Track
 from services.synthesis.meaning import Running, same
-from services.synthesis.primitives import PRIMITIVES
+from services.synthesis.primitives import EXTENDED, PRIMITIVES
 from services.synthesis.primitives.shape import Shape, UnfitError
 from services.synthesis.surroundings import Surroundings, Way
 
@@ -34,7 +35,6 @@ MAX_COORDINATE_M = 1e5
 SIMPLER_CONFIDENCE = 0.5
 """Factor on the confidence when geometry says something simpler than the intent."""
 MAX_REASON = 200
-KNOWN = PRIMITIVES
 
 
 class RefusalError(Exception):
@@ -68,6 +68,7 @@ class Synthesizer:
 
     def __init__(self, config: Config) -> None:
         self._config = config
+        self._known = PRIMITIVES | (EXTENDED if config.primitives == "extended" else {})
         self._history = History()
         self._surroundings = Surroundings(config)
         self._world: str | None = None
@@ -136,8 +137,8 @@ class Synthesizer:
         Raises:
             RefusalError: if the points do not determine such a primitive.
         """
-        if request.primitive not in KNOWN:
-            known = ", ".join(KNOWN)
+        if request.primitive not in self._known:
+            known = ", ".join(self._known)
             raise RefusalError(
                 f"primitive {request.primitive!r} is unknown; known are {known}", "primitive"
             )
@@ -150,7 +151,7 @@ class Synthesizer:
                 [group.mean(axis=0) for group in np.array_split(points, MAX_POINTS, axis=0)]
             )
         try:
-            shape = fit(KNOWN[request.primitive], points, here)
+            shape = fit(self._known[request.primitive], points, here)
             check(shape, self._config, inflation=1.0)
             path = continue_from(shape, Vehicle(here, yaw_rad=None))
         except UnfitError as unfit:
@@ -189,7 +190,9 @@ class Synthesizer:
             self._running = None
 
         vehicle = Vehicle(track.here_m, track.yaw_rad, track.velocity_mps)
-        offer, path = self._offer(intent, track, vehicle)
+        offer, path = self._extended(intent, vehicle, arrival_ns) or self._offer(
+            intent, track, vehicle
+        )
         shape = offer.shape
         position_std_m = math.sqrt(max(newest[1].covariance[0], newest[1].covariance[1]))
         try:
@@ -240,6 +243,22 @@ class Synthesizer:
                 note = f"{label} instead of {reasons[0]}" if reasons else ""
                 return Offer(shape, confidence, note), path
         raise RefusalError("; ".join(reasons))
+
+    def _extended(
+        self, intent: Intent, vehicle: Vehicle, arrival_ns: int
+    ) -> tuple[Offer, Array] | None:
+        """What geometry tells beyond the four, if that is asked for."""
+        if self._config.primitives != "extended":
+            return None
+        way = self._history.since_rest(arrival_ns)
+        shape = extended_shape(way, vehicle.here_m, self._config)
+        if shape is None:
+            return None
+        try:
+            path = continue_from(shape, vehicle)
+        except UnfitError:
+            return None
+        return Offer(shape, intent.confidence, f"{shape.name} by the way flown"), path
 
     def _continued(self, name: str, track: Track, vehicle: Vehicle) -> tuple[Shape, Array]:
         """The shape of the newest motion if it is a given primitive, and the path along it.

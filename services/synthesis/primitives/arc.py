@@ -196,6 +196,13 @@ def angles_about(centre_m: Array, points_m: Array) -> Array:
     return np.asarray(np.unwrap(np.arctan2(y, x)))
 
 
+def turns_of(centre_m: Array, points_m: Array) -> Array:
+    """How the angles of points (N, 2 or more) follow the centre's x and y, (2, N) in rad/m."""
+    dx, dy = centre_m[:, None] - points_m[:, :2].T
+    square = np.maximum(dx**2 + dy**2, 1e-18)
+    return np.stack([-dy / square, dx / square])
+
+
 def angles_ahead(start_rad: float, sense: float, half_turn_m: float, half_turns: int) -> Array:
     """Angles from a start on: 64 steps a half turn, more where that leaves steps over `STEP_M`."""
     steps = half_turns * max(POINTS_PER_HALF_TURN, math.ceil(half_turn_m / STEP_M))

@@ -20,6 +20,7 @@ from services.synthesis.primitives.arc import (
     example_circle,
     fit_circle,
     on_circle,
+    turns_of,
 )
 from services.synthesis.primitives.shape import (
     EXAMPLE_POINTS,
@@ -76,8 +77,8 @@ class Helix(Shape):
         start_rad = circle.angle_of(start_m[:2])
         since_mean = scale * start_rad - float(turned.mean())
         # How the height beside the vehicle follows each of the five parameters.
-        turns = _turns(circle.centre_m, points_m)
-        at_start = _turns(circle.centre_m, start_m[None])[:, 0] - turns.mean(axis=1)
+        turns = turns_of(circle.centre_m, points_m)
+        at_start = turns_of(circle.centre_m, start_m[None])[:, 0] - turns.mean(axis=1)
         slopes = np.array([*(pitch * scale * at_start), 0.0, 1.0, since_mean])
         return cls(
             _climbing(circle.quality(rms), pitch, circle.radius_m),
@@ -147,13 +148,6 @@ class Helix(Shape):
         return np.column_stack([xy, self.start_height_m + self.pitch_m * turned])
 
 
-def _turns(centre_m: Array, points_m: Array) -> Array:
-    """How the angles of points (N, 2 or more) follow the centre's x and y, (2, N) in rad/m."""
-    dx, dy = centre_m[:, None] - points_m[:, :2].T
-    square = np.maximum(dx**2 + dy**2, 1e-18)
-    return np.stack([-dy / square, dx / square])
-
-
 def _refined(circle: Circle, points_m: Array) -> tuple[Circle, float, float, Array]:
     """The circle, the mean height and the pitch by all coordinates, and the covariance (5, 5)."""
     x, y, z = points_m.T
@@ -170,7 +164,7 @@ def _refined(circle: Circle, points_m: Array) -> tuple[Circle, float, float, Arr
         dx, dy = helix[0] - x, helix[1] - y
         distance = np.maximum(np.hypot(dx, dy), 1e-9)
         turned = scale * angles_about(helix[:2], points_m[:, :2])
-        turns = _turns(helix[:2], points_m)
+        turns = turns_of(helix[:2], points_m)
         slopes = np.zeros((5, 2 * count))
         slopes[0, :count], slopes[1, :count] = dx / distance, dy / distance
         slopes[2, :count] = -1.0
