@@ -179,15 +179,15 @@ def _trust(results: Results) -> list[Bar]:
     )
     for period in ("1.0", "0.1"):
         holds = [result["hover"][period] for result in results.judged[OURS].values()]
-        people, asked, given, bothered = (
+        people, asked, intents, given, bothered = (
             sum(hold[key] for hold in holds)
-            for key in ("people", "asked", "suggestions", "bothered")
+            for key in ("people", "asked", "intents", "suggestions", "bothered")
         )
         rows.append(
             Bar(
                 f"suggestions in 60 s of hover corrections, T = {float(period):g} s",
                 "none",
-                f"{given} of {asked} answers; {bothered} of {people} people",
+                f"{given} of {asked} ({intents} intents); {bothered} of {people} people",
                 "-",
                 "met" if given == 0 else f"over by {given} in {people} min",
             )

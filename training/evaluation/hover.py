@@ -1,16 +1,33 @@
-"""Suggestions that a person who only holds the vehicle in its place would be bothered with."""
+"""What a person who only holds the vehicle in its place would be bothered with.
 
+Sticks go through the classifier's own core, and what it takes for a primitive through that of
+synthesis, which knows where the vehicle was and may refuse.
+"""
+
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from common.clock import nanoseconds
-from common.messages import NONE_LABEL, Stick
-from services.classifier.config import Config
+from common.messages import NONE_LABEL, Pose, Stick, Suggestion
+from services.classifier.config import Config as ClassifierConfig
 from services.classifier.core import Classifier
 from services.classifier.model import Model
+from services.synthesis.config import Config as SynthesisConfig
+from services.synthesis.core import Synthesizer
 from training.dataset.primitive import Primitive
+from training.generator.noise import STEP_S
+
+Array = NDArray[np.float64]
 
 HOLD_S = 60.0
+HEIGHT_M = 1.5
+"""Of the place that is held; high enough that no suggestion is refused for the ground."""
+COVARIANCE = (1e-4,) * 6
+"""Of a good localizer's pose."""
 
 
 @dataclass(frozen=True)
@@ -20,34 +37,70 @@ class Bothered:
     Attributes:
         people: who held a place for `HOLD_S`.
         asked: intents.
-        suggestions: those that are not `none`.
-        bothered: people who got any.
+        intents: those that are not `none`.
+        suggestions: those of them that synthesis made a path of.
+        bothered: people who got a suggestion.
     """
 
     people: int
     asked: int
+    intents: int
     suggestions: int
     bothered: int
 
 
-def bothered(model: Model, holds: Sequence[Primitive], period_s: float) -> Bothered:
-    """Run each hold through the classifier's own core, asked every `period_s`."""
-    asked, suggestions, people = 0, 0, 0
+def bothered(model: Model, holds: Sequence[tuple[Primitive, Array]], period_s: float) -> Bothered:
+    """Let people hold a place, asked every `period_s`.
+
+    Args:
+        model: of the classifier.
+        holds: of each person the sticks, and x y z in m and yaw in rad (N, 4) every `STEP_S`.
+        period_s: T.
+    """
+    asked, intents, suggestions, people = 0, 0, 0, 0
     period_ns = nanoseconds(period_s)
-    for hold in holds:
-        core = Classifier(Config(), model)
-        due_ns, before = period_ns, suggestions
+    for hold, places in holds:
+        classifier = Classifier(ClassifierConfig(), model)
+        synthesizer = Synthesizer(SynthesisConfig())
+        poses = _poses(places)
+        flown, due_ns, before = 0, period_ns, suggestions
         for seq, (time_s, stick) in enumerate(
             zip(hold.times_s.tolist(), hold.sticks.tolist(), strict=True)
         ):
             now_ns = nanoseconds(time_s)
+            while flown < len(poses) and poses[flown].stamp <= now_ns:
+                synthesizer.on_pose(poses[flown], poses[flown].stamp)
+                flown += 1
             while now_ns >= due_ns:
+                intent = classifier.intent(due_ns, due_ns)
                 asked += 1
-                suggestions += core.intent(due_ns, due_ns).label != NONE_LABEL
+                intents += intent.label != NONE_LABEL
+                suggestions += isinstance(synthesizer.on_intent(intent, due_ns), Suggestion)
                 due_ns += period_ns
-            core.on_stick(_stick(now_ns, seq, *stick), now_ns)
+            classifier.on_stick(_stick(now_ns, seq, *stick), now_ns)
         people += suggestions > before
-    return Bothered(len(holds), asked, suggestions, people)
+    return Bothered(len(holds), asked, intents, suggestions, people)
+
+
+def _poses(places: Array) -> list[Pose]:
+    """What a localizer would say of these places."""
+    velocities = np.gradient(places[:, :3], STEP_S, axis=0).tolist()
+    return [
+        Pose(
+            stamp=nanoseconds(seq * STEP_S),
+            seq=seq,
+            position=(x, y, z + HEIGHT_M),
+            orientation=(0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw)),
+            velocity=tuple(velocity),
+            angular_velocity=(0.0, 0.0, 0.0),
+            covariance=COVARIANCE,
+            status="ok",
+            source="truth",
+        )
+        for seq, ((x, y, z, yaw), velocity) in enumerate(
+            zip(places.tolist(), velocities, strict=True)
+        )
+    ]
 
 
 def _stick(stamp: int, seq: int, vx: float, vy: float, vz: float, wz: float) -> Stick:

@@ -17,7 +17,7 @@ from training.evaluation.hover import HOLD_S, bothered
 from training.evaluation.measures import tally
 from training.evaluation.names import CALIBRATED, KNOWN, MOMENTS, WHOLE
 from training.evaluation.ours import Ours
-from training.generator.dataset import hovering
+from training.generator.dataset import holds
 from training.windows import examples_of, seen_after
 
 PERIODS_S = (1.0, 0.1)
@@ -98,16 +98,15 @@ def _of_ours(
             meant[f"{kind} {moment}"] = found
     ours.export(model_path)
     model = OnnxModel(model_path)
-    holds = hovering(
-        hovering_people, HOLD_S, int(np.random.SeedSequence((seed, 9)).generate_state(1)[0])
-    )
+    hold_seed = int(np.random.SeedSequence((seed, 9)).generate_state(1)[0])
+    held = holds(hovering_people, HOLD_S, hold_seed)
     return {
         "history": [(epoch.training_loss, epoch.validation_loss) for epoch in ours.fitted.history],
         "none": {
             moment: _auroc(meant[f"four{moment}"], meant[f"none{moment}"])
             for moment in ("", *(f" {name}" for name in MOMENTS))
         },
-        "hover": {str(period_s): vars(bothered(model, holds, period_s)) for period_s in PERIODS_S},
+        "hover": {str(period_s): vars(bothered(model, held, period_s)) for period_s in PERIODS_S},
     }
 
 

@@ -94,17 +94,26 @@ class Stub:
         return Answer(np.array([0.97, 0.01, 0.01, 0.01]), self._meant)
 
 
-def pushing(seconds: float) -> Primitive:
+def pushing(seconds: float, *, moves: bool) -> tuple[Primitive, np.ndarray]:
+    """Sticks forward, and where the vehicle is: on its way, or held by something."""
     times_s = np.arange(round(seconds * 50)) / 50.0
     sticks = np.tile([0.4, 0.0, 0.0, 0.0], (len(times_s), 1))
-    return Primitive(times_s, sticks, NONE, "o", "f", "test")
+    places = np.zeros((len(times_s), 4))
+    places[:, 0] = 0.4 * times_s if moves else 0.0
+    return Primitive(times_s, sticks, NONE, "o", "f", "test"), places
 
 
-def test_suggestions_are_counted_through_the_classifiers_own_core() -> None:
-    sure = bothered(Stub(1.0), [pushing(10.0)] * 2, 1.0)
-    assert (sure.people, sure.bothered) == (2, 2)
-    assert sure.suggestions == sure.asked == 2 * 9
-    assert bothered(Stub(0.1), [pushing(10.0)], 1.0).suggestions == 0
+def test_suggestions_are_counted_through_the_services_own_cores() -> None:
+    flown = [pushing(10.0, moves=True)] * 2
+    sure = bothered(Stub(1.0), flown, 1.0)
+    assert (sure.people, sure.asked, sure.intents, sure.bothered) == (2, 18, 18, 2)
+    assert sure.suggestions > 10
+    assert bothered(Stub(0.1), flown, 1.0).intents == 0
+
+
+def test_intents_of_a_vehicle_that_stays_are_no_suggestions() -> None:
+    stayed = bothered(Stub(1.0), [pushing(10.0, moves=False)], 1.0)
+    assert (stayed.intents, stayed.suggestions, stayed.bothered) == (9, 0, 0)
 
 
 def test_latency_is_that_of_single_windows() -> None:
@@ -137,7 +146,7 @@ def result(right: float, families: list[str]) -> dict:
         "history": [(1.0, 1.1), (0.5, 0.6)],
         "none": {"": {"auroc": 0.98, "n": 800}},
         "hover": {
-            period: {"people": 20, "asked": 1200, "suggestions": 0, "bothered": 0}
+            period: dict.fromkeys(("asked", "people", "intents", "suggestions", "bothered"), 0)
             for period in ("1.0", "0.1")
         },
     }
