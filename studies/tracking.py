@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from common import messages as m
 from common.frames import yaw_of
@@ -83,13 +84,18 @@ PATHS: dict[str, tuple[Callable[[], Points], bool, float]] = {
 }
 """By primitive: the path at the origin, whether it is closed, and how often it is flown."""
 
+HOVER = "hover"
+"""The name of a case that flies no path but keeps the place at the end of a short line."""
+KEPT_S = 30.0
+SETTLING_S = 3.0
+
 
 @dataclass(frozen=True)
 class Case:
     """What is flown, in what.
 
     Attributes:
-        primitive: a name of `PATHS`.
+        primitive: a name of `PATHS`, or `HOVER`.
         plant: of the vehicle.
         wind_mps: from a direction drawn by the seed.
         gusts: whether the wind gusts.
@@ -113,7 +119,7 @@ class Flight:
         reason: why it ended; `flown` if all of the path was.
         cross_track_m: true distances to the path, 50 a second.
         speed_mps: mean, along the path.
-        path_m: (N, 3).
+        path_m: (N, 3); the place kept in a hover.
         flown_m: true places, (M, 3).
     """
 
@@ -229,7 +235,7 @@ def _fly(case: Case, chain: Lockstep, helmsman: _Helmsman, heading_rad: float) -
         raise RuntimeError(f"{case}: the start was not reached")
     helmsman.lets_go = True
     chain.run(2.0 / RATE_HZ)
-    make, closed, laps = PATHS[case.primitive]
+    make, closed, laps = PATHS.get(case.primitive, (lambda: line(1.0), False, 1.0))
     points = _placed(make(), poses[-1].position, yaw_of(poses[-1].orientation))
     chain.say("suggestion", _suggestion(case.primitive, points, closed, chain.now_ns))
     reply = chain.decide("accept")
@@ -249,21 +255,20 @@ def _fly(case: Case, chain: Lockstep, helmsman: _Helmsman, heading_rad: float) -
         reason = "flown" if closed and last.progress > whole_m else "too slow"
     else:
         reason = "flown" if last.reason == "finished" else last.reason
+    if case.primitive == HOVER:
+        chain.run(SETTLING_S)
+        around_m = path_m = np.array([truths[-1].position])
+        truths.clear()
+        chain.run(KEPT_S)
     flown_along_m = max((status.progress for status in statuses[first:]), default=0.0)
     flown_m = np.array([pose.position for pose in truths])[::2]
     return Flight(
         reason,
-        _distances(flown_m, resample(around_m, 0.01)),
+        np.asarray(cKDTree(resample(around_m, 0.01)).query(flown_m)[0]),
         flown_along_m / ((chain.now_ns - begin_ns) * 1e-9),
         path_m,
         flown_m,
     )
-
-
-def _distances(flown_m: Array, path_m: Array) -> Array:
-    from scipy.spatial import cKDTree
-
-    return np.asarray(cKDTree(path_m).query(flown_m)[0])
 
 
 def _placed(points: Points, position_m: tuple[float, float, float], yaw_rad: float) -> Points:

@@ -6,7 +6,7 @@ import pytest
 from services.autopilot.follower import Follower
 from studies.baselines.goto import COMMANDS, GotoQueue, hurried
 from studies.baselines.predictive import PredictiveFollower
-from studies.tracking import PATHS, Case, arc, fly, line
+from studies.tracking import HOVER, PATHS, Case, arc, fly, line
 
 
 @pytest.mark.parametrize("plant", ["tum", "ardrone"])
@@ -43,3 +43,10 @@ def test_the_ideal_paths_are_what_they_are_called():
     assert helix[-1, 2] == pytest.approx(1.2, abs=0.02)
     assert helix[-1, 3] == pytest.approx(4.0 * np.pi, abs=0.1)
     assert COMMANDS == 64
+
+
+def test_a_hover_keeps_its_place_in_wind():
+    flight = fly(Case(HOVER, "ardrone", wind_mps=3.0, seed=1))
+    assert flight.is_complete
+    assert flight.path_m.shape == (1, 3)
+    assert flight.rmse_m < 0.05
