@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.frames import Array, wrap_angle
+from services.synthesis.primitives.plane import way_of
 from services.synthesis.primitives.shape import Shape, UnfitError
 
 MAX_OFFSET_M = 0.5
@@ -77,8 +78,7 @@ def blend(ahead_m: Array, here_m: Array, closed: bool, kink: Array | None = None
     if offset_m > MAX_OFFSET_M:
         raise UnfitError(f"the vehicle is {offset_m:.2f} m away from it")
     kink = np.zeros(3) if kink is None else kink
-    steps = np.linalg.norm(np.diff(ahead_m, axis=0), axis=1)
-    way = np.concatenate([[0.0], np.cumsum(steps)])
+    way = way_of(ahead_m)
     length = max(
         MIN_BLEND_M, BLEND_PER_OFFSET * offset_m, BLEND_PER_KINK_M * float(np.linalg.norm(kink))
     )

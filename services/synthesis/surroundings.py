@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from common.frames import Array
 from services.synthesis.config import Config
+from services.synthesis.primitives.plane import way_of
 from services.synthesis.primitives.shape import UnfitError
 from worlds import Body
 
@@ -82,7 +83,7 @@ class Surroundings:
             return Way(path, closed, note)
         first = int(hits[0])
         what = names[int(np.argmin(np.where(bad[:, first], room[:, first], np.inf)))]
-        left_m = float(np.sum(np.linalg.norm(np.diff(points[:first], axis=0), axis=1)))
+        left_m = float(way_of(points[:first])[-1])
         if left_m < MIN_PATH_M:
             raise UnfitError(f"{what} {left_m:.1f} m ahead")
         return Way(path[:first], False, f"ends after {left_m:.1f} m: {what} ahead")

@@ -18,6 +18,7 @@ import numpy as np
 from common.frames import Array
 from services.synthesis.config import Config
 from services.synthesis.primitives.arc import angles_about, taubin
+from services.synthesis.primitives.plane import at_ways, way_of
 from services.synthesis.primitives.shape import (
     EXAMPLE_POINTS,
     MAX_STEPS,
@@ -222,13 +223,12 @@ class Compound(Shape):
 
 def _even(xy: Array) -> Array:
     """Points (M, 2) `CHORD_M` apart along the way of points (N, 2), oldest first."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(xy, axis=0), axis=1))])
-    count = math.floor(float(way[-1]) / CHORD_M)
+    whole_m = float(way_of(xy)[-1])
+    count = math.floor(whole_m / CHORD_M)
     if count < 3 * MIN_CHORDS:
         raise UnfitError("the way is too short")
     # The newest chords end at the vehicle; the oldest may be cut off.
-    even = float(way[-1]) - CHORD_M * np.arange(min(count, MAX_CHORDS), -1, -1.0)
-    return np.column_stack([np.interp(even, way, axis) for axis in xy.T])
+    return at_ways(xy, whole_m - CHORD_M * np.arange(min(count, MAX_CHORDS), -1, -1.0))
 
 
 def _change_points(xy: Array) -> tuple[list[int], float]:

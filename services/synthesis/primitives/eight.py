@@ -14,6 +14,7 @@ from scipy.ndimage import uniform_filter1d
 
 from common.frames import Array
 from services.synthesis.config import Config
+from services.synthesis.primitives.plane import at_ways, turned_back, way_of
 from services.synthesis.primitives.shape import (
     EXAMPLE_POINTS,
     MAX_STEPS,
@@ -190,29 +191,23 @@ class Eight(Shape):
     def ahead(self) -> Array:
         """One lap, whose last point is its first."""
         dense = _on(self.eight, self.phase_rad + np.linspace(0.0, 2.0 * math.pi, 1025))
-        steps = np.linalg.norm(np.diff(dense, axis=0), axis=1)
-        way = np.concatenate([[0.0], np.cumsum(steps)])
-        count = min(max(round(float(way[-1]) / STEP_M), 128), MAX_STEPS)
-        even = np.linspace(0.0, way[-1], count + 1)
-        xy = np.column_stack([np.interp(even, way, axis) for axis in dense.T])
+        lap_m = float(way_of(dense)[-1])
+        count = min(max(round(lap_m / STEP_M), 128), MAX_STEPS)
+        xy = at_ways(dense, np.linspace(0.0, lap_m, count + 1))
         xy[-1] = xy[0]
         return np.column_stack([xy, np.full(len(xy), self.height_m)])
 
 
 def _on(eight: Array, phases: Array) -> Array:
     """Places (N, 2) on an eight."""
-    cos, sin = math.cos(eight[2]), math.sin(eight[2])
     along, across = eight[3] * np.sin(phases), eight[4] * np.sin(2.0 * phases)
-    return np.column_stack(
-        [eight[0] + cos * along - sin * across, eight[1] + sin * along + cos * across]
-    )
+    return eight[:2] + turned_back(along, across, float(eight[2]))
 
 
 def _tangent(eight: Array, phases: Array) -> Array:
     """How these places follow the phase, (N, 2) in m/rad."""
-    cos, sin = math.cos(eight[2]), math.sin(eight[2])
     along, across = eight[3] * np.cos(phases), 2.0 * eight[4] * np.cos(2.0 * phases)
-    return np.column_stack([cos * along - sin * across, sin * along + cos * across])
+    return turned_back(along, across, float(eight[2]))
 
 
 def _lap_m(eight: Array) -> float:

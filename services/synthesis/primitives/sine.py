@@ -15,6 +15,7 @@ import numpy as np
 
 from common.frames import Array
 from services.synthesis.config import Config
+from services.synthesis.primitives.plane import turned, turned_back, way_of
 from services.synthesis.primitives.shape import (
     EXAMPLE_POINTS,
     MAX_STEPS,
@@ -82,7 +83,7 @@ class Sine(Shape):
         mean = xy.mean(axis=0)
         wave, covariance = _fit_wave(xy - mean)
         axis_rad, offset, sine, cosine, number = (float(v) for v in wave)
-        along, across = _turned(xy - mean, axis_rad)
+        along, across = turned(xy - mean, axis_rad)
         slope = number * (sine * np.cos(number * along) - cosine * np.sin(number * along))
         off = across - _wave(along, offset, sine, cosine, number)
         off = off / np.hypot(1.0, slope)
@@ -97,7 +98,7 @@ class Sine(Shape):
             # Looking the other way both coordinates change sign: -A sin(-k s + p) = A sin(k s - p).
             axis_rad += math.pi
             offset, phase, along = -offset, -phase, -along
-        beside = _turned(start_m[None, :2] - mean, axis_rad)
+        beside = turned(start_m[None, :2] - mean, axis_rad)
         start_along, start_across = float(beside[0][0]), float(beside[1][0])
         heading = math.remainder(axis_rad, 2.0 * math.pi)
         cos, sin = math.cos(heading), math.sin(heading)
@@ -190,11 +191,8 @@ class Sine(Shape):
         anchor = np.array([*rng.uniform(-10.0, 10.0, 2), rng.uniform(1.0, 3.0)])
         along = np.linspace(0.0, extent * wavelength, count)
         across = amplitude * np.sin(2.0 * math.pi * along / wavelength + phase)
-        cos, sin = math.cos(heading), math.sin(heading)
-        way = np.column_stack(
-            [cos * along - sin * across, sin * along + cos * across, np.zeros(len(along))]
-        )
-        beside = anchor + along[-1] * np.array([cos, sin, 0.0])
+        way = np.column_stack([turned_back(along, across, heading), np.zeros(len(along))])
+        beside = anchor + along[-1] * np.array([math.cos(heading), math.sin(heading), 0.0])
         return Example(
             anchor + way,
             {
@@ -221,30 +219,15 @@ class Sine(Shape):
     def ahead(self) -> Array:
         """The next three waves."""
         dense = np.linspace(0.0, WAVES_AHEAD * self.wavelength_m, 128 * WAVES_AHEAD + 1)
-        across = self._across(dense)
-        length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(dense), np.diff(across)))])
+        length = way_of(np.column_stack([dense, self._across(dense)]))
         steps = min(max(round(float(length[-1]) / STEP_M), 32 * WAVES_AHEAD), MAX_STEPS)
         along = np.interp(np.linspace(0.0, length[-1], steps + 1), length, dense)
-        across = self._across(along)
-        cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        x, y, z = self.anchor_m
-        return np.column_stack(
-            [
-                x + cos * along - sin * across,
-                y + sin * along + cos * across,
-                np.full_like(along, z),
-            ]
-        )
+        xy = self.anchor_m[:2] + turned_back(along, self._across(along), self.heading_rad)
+        return np.column_stack([xy, np.full_like(along, self.anchor_m[2])])
 
     def _across(self, along: Array) -> Array:
         number = 2.0 * math.pi / self.wavelength_m
         return np.asarray(self.amplitude_m * np.sin(number * along + self.phase_rad))
-
-
-def _turned(xy: Array, axis_rad: float) -> tuple[Array, Array]:
-    """Points (N, 2) along and to the left of an axis."""
-    cos, sin = math.cos(axis_rad), math.sin(axis_rad)
-    return cos * xy[:, 0] + sin * xy[:, 1], cos * xy[:, 1] - sin * xy[:, 0]
 
 
 def _wave(along: Array, offset: float, sine: float, cosine: float, number: float) -> Array:
@@ -257,7 +240,7 @@ def _first_guesses(xy: Array, axis_rad: float) -> list[tuple[float, Array]]:
     For each wave number the best offset, trend, sine and cosine are linear; the trend turns the
     axis.
     """
-    along, across = _turned(xy, axis_rad)
+    along, across = turned(xy, axis_rad)
     extent = float(np.ptp(along))
     numbers = 2.0 * math.pi * _START_WAVES / extent
     phases = np.outer(numbers, along)

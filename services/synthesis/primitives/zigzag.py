@@ -9,6 +9,7 @@ import numpy as np
 
 from common.frames import Array
 from services.synthesis.config import Config
+from services.synthesis.primitives.plane import at_ways, turned, way_of
 from services.synthesis.primitives.shape import (
     EXAMPLE_POINTS,
     MAX_STEPS,
@@ -70,7 +71,7 @@ class Zigzag(Shape):
         xy = points_m[:, :2] - points_m[:, :2].mean(axis=0)
         axis_rad = _axis(xy)
         for _ in range(2):
-            along, across = _turned(xy, axis_rad)
+            along, across = turned(xy, axis_rad)
             ends = _reversals(along)
             if len(ends) < MIN_LEGS - 1:
                 raise UnfitError(f"it turns back only {len(ends)} times")
@@ -92,7 +93,7 @@ class Zigzag(Shape):
         reach_std = max(reach, sigma) * math.sqrt(1.0 / len(tops) + 1.0 / len(bottoms))
         way = 1.0 if along[-1] > along[ends[-1]] else -1.0
         last = len(ends)
-        start_along, _ = _turned(start_m[None, :2] - points_m[:, :2].mean(axis=0), axis_rad)
+        start_along, _ = turned(start_m[None, :2] - points_m[:, :2].mean(axis=0), axis_rad)
         beside = float(weights[0] + weights[1] * (last - legs.mean()))
         here = float(start_along[0])
         cos, sin = math.cos(axis_rad), math.sin(axis_rad)
@@ -167,7 +168,7 @@ class Zigzag(Shape):
         z = float(rng.uniform(1.0, 3.0))
         way = _mown(np.zeros(2), heading, length, spacing, length, math.ceil(extent) + 1)
         lap_m = length - abs(spacing) + math.pi * abs(spacing) / 2.0
-        points = _even(way, extent * lap_m, count)
+        points = at_ways(way, np.linspace(0.0, extent * lap_m, count))
         whole = math.floor(extent)
         turned = heading + math.pi * (whole % 2)
         along = (points[-1] - points[0]) @ np.array([math.cos(turned), math.sin(turned)])
@@ -210,15 +211,9 @@ class Zigzag(Shape):
             self.left_m,
             LEGS_AHEAD,
         )
-        way_m = float(np.sum(np.linalg.norm(np.diff(xy, axis=0), axis=1)))
-        xy = _even(xy, way_m, min(max(round(way_m / STEP_M), 2), MAX_STEPS) + 1)
+        way_m = float(way_of(xy)[-1])
+        xy = at_ways(xy, np.linspace(0.0, way_m, min(max(round(way_m / STEP_M), 2), MAX_STEPS) + 1))
         return np.column_stack([xy, np.full(len(xy), self.anchor_m[2])])
-
-
-def _turned(xy: Array, axis_rad: float) -> tuple[Array, Array]:
-    """Points (N, 2) along and to the left of an axis."""
-    cos, sin = math.cos(axis_rad), math.sin(axis_rad)
-    return cos * xy[:, 0] + sin * xy[:, 1], cos * xy[:, 1] - sin * xy[:, 0]
 
 
 def _axis(xy: Array) -> float:
@@ -291,10 +286,3 @@ def _mown(
         way = np.vstack([here_m, way[1:][max(0, int(np.argmax(ahead))) :]])
     keep = np.concatenate([[True], np.linalg.norm(np.diff(way, axis=0), axis=1) > 1e-9])
     return np.asarray(way[keep])
-
-
-def _even(xy: Array, way_m: float, count: int) -> Array:
-    """Points (count, 2) evenly along the first metres of a polyline."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(xy, axis=0), axis=1))])
-    even = np.linspace(0.0, min(way_m, float(way[-1])), count)
-    return np.column_stack([np.interp(even, way, axis) for axis in xy.T])
