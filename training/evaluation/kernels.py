@@ -1,8 +1,8 @@
 """Peers of the field from aeon: random convolutions with a ridge, and intervals with trees.
 
 They want series of one length. A motion's length tells shapes apart and is lost when each window
-is stretched, so windows are zero-padded to 4 s. For the sake of time they see 25 Hz and learn from
-every third window.
+is stretched, so windows are zero-padded to the longest there is. For the sake of time they see 25
+or 12.5 Hz, and learn from every third window.
 """
 
 from typing import Any
@@ -17,6 +17,7 @@ from aeon.transformations.collection.interval_based import QUANTTransformer
 from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
 
+from services.classifier.window import WINDOW_SAMPLES
 from training.evaluation.contender import Lesson, Scores, Tell
 from training.evaluation.ridge import Ridge
 from training.evaluation.views import padded, thinned
@@ -26,17 +27,21 @@ from training.windows import Windows
 Array32 = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 
-EVERY_SAMPLES = 2
 BATCH = 2000
 """Series transformed at once: MultiRocket's features of more do not fit into a small memory."""
+QUANT_EVERY = 2
 QUANT_TREES = 200
 """As its authors use."""
 
 
-def _lesson(windows: Windows, full_yaw_radps: float) -> tuple[Array32, IntArray]:
+def _series(windows: Windows, full_yaw_radps: float, every: int) -> Array32:
+    return padded(windows, full_yaw_radps, WINDOW_SAMPLES, every)
+
+
+def _lesson(windows: Windows, full_yaw_radps: float, every: int) -> tuple[Array32, IntArray]:
     """Series to learn from, and their labels."""
     some = thinned(windows)
-    return padded(some, full_yaw_radps, EVERY_SAMPLES), some.labels
+    return _series(some, full_yaw_radps, every), some.labels
 
 
 class Rocket:
@@ -44,15 +49,17 @@ class Rocket:
 
     has_probabilities = False
 
-    def __init__(self, name: str, kinds: tuple[type, ...]) -> None:
+    def __init__(self, name: str, kinds: tuple[type, ...], every: int) -> None:
+        """`every` so many samples are averaged to one."""
         self.name = name
         self._kinds = kinds
+        self._every = every
 
     def fit(self, lesson: Lesson, seed: int, tell: Tell) -> None:
         """Draw kernels, then solve the ridge."""
         self._yaw_radps = lesson.full_yaw_radps
-        series, labels = _lesson(lesson.windows, self._yaw_radps)
-        held, held_labels = _lesson(lesson.held, self._yaw_radps)
+        series, labels = _lesson(lesson.windows, self._yaw_radps, self._every)
+        held, held_labels = _lesson(lesson.held, self._yaw_radps, self._every)
         self._transforms = [kind(random_state=seed) for kind in self._kinds]
         for transform in self._transforms:
             transform.fit(series)
@@ -62,7 +69,7 @@ class Rocket:
 
     def scores(self, windows: Windows) -> Scores:
         """Of the ridge."""
-        series = padded(windows, self._yaw_radps, EVERY_SAMPLES)
+        series = _series(windows, self._yaw_radps, self._every)
         return self._ridge.scores(self._features(series, _quiet))
 
     def _features(self, series: Array32, tell: Tell) -> Array32:
@@ -90,12 +97,12 @@ def _quiet(_done: int, _of: int) -> None:
 
 def minirocket() -> Rocket:
     """MiniRocket (Dempster et al. 2021)."""
-    return Rocket("MiniRocket", (MiniRocket,))
+    return Rocket("MiniRocket", (MiniRocket,), 2)
 
 
 def multirocket_hydra() -> Rocket:
     """MultiRocket and Hydra together (Dempster et al. 2023)."""
-    return Rocket("MultiRocketHydra", (MultiRocket, HydraTransformer))
+    return Rocket("MultiRocketHydra", (MultiRocket, HydraTransformer), 4)
 
 
 class Quant:
@@ -107,7 +114,7 @@ class Quant:
     def fit(self, lesson: Lesson, seed: int, tell: Tell) -> None:
         """Learn from padded windows."""
         self._yaw_radps = lesson.full_yaw_radps
-        series, labels = _lesson(lesson.windows, self._yaw_radps)
+        series, labels = _lesson(lesson.windows, self._yaw_radps, QUANT_EVERY)
         self._transform = QUANTTransformer().fit(series, labels)
         self._trees = ExtraTreesClassifier(
             QUANT_TREES, criterion="entropy", max_features=0.1, random_state=seed
@@ -117,5 +124,5 @@ class Quant:
 
     def scores(self, windows: Windows) -> Scores:
         """The trees' probabilities."""
-        series = padded(windows, self._yaw_radps, EVERY_SAMPLES)
+        series = _series(windows, self._yaw_radps, QUANT_EVERY)
         return np.asarray(self._trees.predict_proba(np.asarray(self._transform.transform(series))))

@@ -19,6 +19,8 @@ from training.windows import Windows
 Array32 = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 
+SAMPLES = 200
+"""Sequences are padded to this; of longer ones it sees the newest."""
 WIDTH = 64
 TAPS = (7, 5, 5, 3)
 STRIDES = (2, 2, 1, 1)
@@ -98,7 +100,7 @@ class ThesisNetwork:
         """Learn, note the best epoch, learn again from training and validation people."""
         self._yaw_radps = lesson.full_yaw_radps
         some, other = thinned(lesson.windows), thinned(lesson.held)
-        series, held = padded(some, self._yaw_radps), padded(other, self._yaw_radps)
+        series, held = self._series(some), self._series(other)
         labels, held_labels = some.labels, other.labels
         epochs, self.history = self._train(
             series, labels, seed, EPOCHS, lambda done, of: tell(done, 2 * of), held, held_labels
@@ -168,7 +170,10 @@ class ThesisNetwork:
                 ]
             )
 
+    def _series(self, windows: Windows) -> Array32:
+        return padded(windows, self._yaw_radps, SAMPLES)
+
     def scores(self, windows: Windows) -> Scores:
         """The softmax."""
-        logits = self._logits(padded(windows, self._yaw_radps))
+        logits = self._logits(self._series(windows))
         return np.asarray(torch.softmax(logits, 1).numpy(), dtype=np.float64)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from services.classifier.window import MODEL_RATE_HZ, WINDOW_SAMPLES
+from services.classifier.window import MODEL_RATE_HZ
 from training.windows import Windows
 
 Array32 = NDArray[np.float32]
@@ -37,17 +37,19 @@ def in_start_frame(windows: Windows, full_yaw_radps: float) -> Array32:
     return np.where(inside, turned, 0.0).astype(np.float32)
 
 
-def padded(windows: Windows, full_yaw_radps: float, every: int = 1) -> Array32:
-    """Series (n, 3, 200 / every) for models of fixed length: zero after a window's own length.
+def padded(windows: Windows, full_yaw_radps: float, samples: int, every: int = 1) -> Array32:
+    """Series (n, 3, samples / every) for models of fixed length: zero after a window's own.
 
     Args:
         windows: what to show.
         full_yaw_radps: the vehicle's yaw rate at full stick.
+        samples: how many are shown, the newest of longer windows.
         every: how many samples are averaged to one.
     """
     sticks = in_start_frame(windows, full_yaw_radps)
-    missing = WINDOW_SAMPLES - sticks.shape[1]
-    series = np.pad(sticks, ((0, 0), (0, max(0, missing)), (0, 0))).transpose(0, 2, 1)
-    n, channels, samples = series.shape
-    means = series.reshape(n, channels, samples // every, every).mean(axis=3)
-    return np.ascontiguousarray(means, dtype=np.float32)
+    series = np.zeros((len(sticks), 3, samples), dtype=np.float32)
+    for row, (one, length) in enumerate(zip(sticks, windows.lengths.tolist(), strict=True)):
+        newest = one[max(0, length - samples) : length]
+        series[row, :, : len(newest)] = newest.T
+    means = series.reshape(len(series), 3, samples // every, every).mean(axis=3)
+    return np.asarray(means, dtype=np.float32)

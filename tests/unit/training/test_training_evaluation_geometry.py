@@ -84,10 +84,17 @@ def test_forward_with_yaw_is_an_arc_in_the_frame_of_the_start() -> None:
 
 
 def test_series_of_fixed_length_are_zero_after_a_windows_own() -> None:
-    series = padded(windows(np.tile([0.5, 0.0, 0.2, 0.0], (120, 1)), 80), 1.0, every=2)
+    series = padded(windows(np.tile([0.5, 0.0, 0.2, 0.0], (120, 1)), 80), 1.0, 200, every=2)
     assert series.shape == (1, 3, 100)
     assert series[0, 0, :40] == pytest.approx(np.full(40, 0.5))
     assert not series[0, :, 40:].any()
+
+
+def test_longer_windows_show_their_newest_samples() -> None:
+    sticks = np.tile(np.linspace(0.0, 1.0, 120)[:, None], (1, 4))
+    sticks[:, 3] = 0.0
+    series = padded(windows(sticks, 110), 1.0, 50)
+    assert series[0, 2] == pytest.approx(sticks[60:110, 2])
 
 
 def drawn() -> Primitive:
