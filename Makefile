@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --disable-pip-version-check -c constraints.t
 SCRIPTS := .ci/run deploy/install
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo up check test test-compose bench fits flight properties people train evaluate picture lock docs format clean
+.PHONY: help setup demo up check test test-compose bench fits flight properties people train evaluate picture shapes lock docs format clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -95,6 +95,9 @@ evaluate: $(VENV)/.evaluation ## every classifier on the same people, against th
 
 picture: setup $(VENV)/.all ## the README's picture anew: flies the demo and photographs the console
 	$(BIN)/python docs/picture.py
+
+shapes: $(VENV)/.all ## the figure of what is suggested
+	$(BIN)/python docs/shapes.py
 
 lock: $(BIN)/python ## renew constraints.txt to the newest versions that fit pyproject.toml
 	$(BIN)/python -m pip install --quiet pip-tools
