@@ -34,7 +34,7 @@ from services.classifier.window import MODEL_RATE_HZ, WINDOW_S, WINDOW_SAMPLES, 
 
 Call = Callable[[], object]
 
-SAMPLES = (50, 100, 200)
+SAMPLES = tuple(sorted({50, 100, 200, WINDOW_SAMPLES}))
 PAD_HZ = 100
 PERIOD_S = 0.1
 IN_PROCESS_TARGET = "p50 <= 0.2, p99 <= 0.3"

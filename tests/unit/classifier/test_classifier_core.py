@@ -6,6 +6,7 @@ from common.messages import ClassifyRequest, Stick, VehicleStatus
 from services.classifier.config import Config
 from services.classifier.core import Classifier, UnusableSamplesError
 from services.classifier.model import SHORTEST_SAMPLES, Answer, ModelError
+from services.classifier.window import WINDOW_S, WINDOW_SAMPLES
 
 STEP_NS = 20_000_000
 SESSION_NS = 5 * 10**18
@@ -200,11 +201,11 @@ def test_given_samples_are_classified_at_their_rate(model: Fixed) -> None:
     assert len(model.seen[0]) == 100
 
 
-def test_of_many_samples_the_newest_four_seconds_count(model: Fixed) -> None:
+def test_of_many_samples_the_newest_window_counts(model: Fixed) -> None:
     request = ClassifyRequest(samples=[(0.5, 0.0, 0.1)] * 5000, rate=100.0)
     intent = Classifier(Config(), model).classify(request, SESSION_NS)
-    assert intent.samples == 401
-    assert len(model.seen[0]) == 200
+    assert intent.samples == WINDOW_S * 100 + 1
+    assert len(model.seen[0]) == WINDOW_SAMPLES
 
 
 def test_of_given_samples_the_newest_motion_counts(model: Fixed) -> None:

@@ -71,9 +71,9 @@ def test_turning_on_the_spot_is_rest() -> None:
 
 
 @pytest.mark.parametrize("rate_hz", [20, 50, 100, 300])
-def test_the_window_is_four_seconds_at_every_rate(rate_hz: int) -> None:
+def test_the_window_is_as_long_at_every_rate(rate_hz: int) -> None:
     window = StickWindow()
-    push(window, 0, 6 * rate_hz, 1_000_000_000 // rate_hz, vx=0.5)
+    push(window, 0, round(WINDOW_S + 2) * rate_hz, 1_000_000_000 // rate_hz, vx=0.5)
     motion = motion_of(window)
     assert motion.sticks.shape == (WINDOW_SAMPLES, 4)
     assert motion.sticks.dtype == np.float32
@@ -141,7 +141,7 @@ def test_a_long_motion_goes_on_and_on() -> None:
         assert motion.end_ns == tick * STEP_NS
         assert motion.start_ns == max(0, tick - WINDOW_SAMPLES + 1) * STEP_NS
         assert motion.sources == len(motion.sticks) == min(tick + 1, WINDOW_SAMPLES)
-    wanted = 0.5 + 0.1 * np.sin(0.01 * np.arange(2800, 3000))
+    wanted = 0.5 + 0.1 * np.sin(0.01 * np.arange(3000 - WINDOW_SAMPLES, 3000))
     assert motion.sticks[:, 0] == pytest.approx(wanted, abs=1e-6)
 
 
@@ -151,7 +151,7 @@ def test_a_long_motion_goes_on_and_on() -> None:
         st.tuples(st.integers(-400_000_000, 400_000_000), axis, axis, axis, axis), max_size=150
     )
 )
-def test_whatever_comes_the_window_is_finite_and_spans_at_most_four_seconds(rows: list) -> None:
+def test_whatever_comes_the_window_is_finite_and_no_longer_than_it_may_be(rows: list) -> None:
     window = StickWindow()
     now = 10**12
     for step_ns, vx, vy, vz, wz in rows:
