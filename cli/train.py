@@ -48,6 +48,19 @@ def declare(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="go on with a run of the same preset, seed and folder that was stopped",
     )
+    parser.add_argument(
+        "--finetune",
+        metavar="FILE",
+        type=Path,
+        help="adapt a model to one person's performances, a file of 'autocomplete dataset'",
+    )
+    parser.add_argument(
+        "--model",
+        metavar="FILE",
+        type=Path,
+        default=Path("models/intent.onnx"),
+        help="the model that --finetune begins with (models/intent.onnx)",
+    )
     parser.set_defaults(action=_run)
 
 
@@ -95,15 +108,34 @@ def _run(options: argparse.Namespace) -> int:
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=console) as progress:
+        bars = _Bars(progress)
+        if options.finetune is not None:
+            return _finetune(console, options, bars)
         run = train(
             options.preset,
             options.seed,
             options.out,
-            _Bars(progress),
+            bars,
             resume=options.resume,
             processes=1 if options.preset == "quick" else min(4, os.cpu_count() or 1),
         )
     _report(console, run)
+    return 0
+
+
+def _finetune(console: Console, options: argparse.Namespace, bars: _Bars) -> int:
+    from training.dataset.check import load_sound
+    from training.finetune import finetune
+
+    primitives, findings = load_sound(options.finetune)
+    for finding in findings:
+        console.print(f"left out: {finding}")
+    done = finetune(primitives, options.model, options.out, options.seed, bars.generating)
+    console.print(
+        f"{done.performances} performances: F1 {done.before:.3f} before;"
+        f" {done.after:.3f} after, on those left out of each of three adaptations"
+    )
+    console.print(f"{done.path}  sha256 {done.sha256[:8]}")
     return 0
 
 

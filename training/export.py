@@ -2,8 +2,10 @@
 
 import hashlib
 import json
+import pickle
 import warnings
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ import torch
 from services.classifier.model import CONTRACT, INPUTS, OUTPUTS
 from services.classifier.window import MODEL_RATE_HZ
 from training.fit import FULL_YAW_RADPS, Fitted, inputs_of
+from training.network import Architecture, Network
 from training.windows import padded
 
 OPSET = 17
@@ -54,3 +57,36 @@ def export(fitted: Fitted, labels: Sequence[str], name: str, path: Path) -> str:
     onnx.checker.check_model(graph, full_check=True)
     onnx.save(graph, str(path))
     return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def save(fitted: Fitted, path: Path) -> None:
+    """Write the weights as torch has them, for `finetune`: ONNX files fold batch norms away."""
+    torch.save(
+        {
+            "architecture": asdict(fitted.network.architecture),
+            "weights": fitted.network.state_dict(),
+            "temperature": fitted.temperature,
+            "platt": fitted.platt,
+            "confidence_min": fitted.confidence_min,
+        },
+        path,
+    )
+
+
+def load(path: Path) -> Fitted:
+    """What `save` wrote.
+
+    Raises:
+        OSError: if there is no such file, or it is none of `save`'s.
+    """
+    try:
+        state = torch.load(path, weights_only=True)
+        network = Network(Architecture(**state["architecture"]))
+        network.load_state_dict(state["weights"])
+        return Fitted(
+            network.eval(), state["temperature"], tuple(state["platt"]), state["confidence_min"]
+        )
+    except (RuntimeError, EOFError, KeyError, TypeError, pickle.UnpicklingError):
+        raise OSError(
+            f"weights {path}: not of this version's network; train anew with 'autocomplete train'"
+        ) from None

@@ -24,10 +24,16 @@ STILL = 0.1
 """Below this deflection a direction is mostly noise."""
 BACK = 1e-4
 """Keeps the turn of a stick that is pulled straight back from depending on a rounding error."""
-WAVES = 8
-"""Cosines over a window that a summary is made of: eight half periods, four whole ones."""
-SIGNED = 10
-"""The first signals of a summary are signed: their coefficients' sizes are features as well."""
+WAVES = 6
+"""Cosines over a window that a summary is made of: six half periods."""
+PLANES = 3
+"""In which turns are measured: the sticks' horizontal one, and the flown path's two."""
+SIGNALS, SIGNED = 28, 17
+"""A summary's signals; the first are signed: their coefficients' sizes are features as well."""
+LAG_S, LAG_TAPS = 0.4, 40
+"""A vehicle's speed follows its stick with about this time constant (tum plant 0.3 to 0.4 s)."""
+UP_PER_AHEAD = 0.5
+"""Speed of full stick upwards, of that ahead (tum plant; about as much on the ardrone)."""
 
 
 def _length(x: Tensor, floor: float) -> Tensor:
@@ -40,23 +46,34 @@ class Geometry(nn.Module):
 
     waves: Tensor
     kernels: Tensor
+    quarter: Tensor
+    lag: Tensor
 
-    CHANNELS = 16
-    STICKS = (4, 5, 2, 14)
+    CHANNELS = 22
+    STICKS = (5, 6, 3, 20)
     """Which of the channels are the sticks themselves: vx, vy, vz, wz."""
-    SUMMARY = 2 * (WAVES + 1) * (15 + SIGNED) + 20
+    SUMMARY = 2 * (WAVES + 1) * (SIGNALS + SIGNED) + 16 * PLANES + 5
 
     def __init__(self) -> None:
         super().__init__()
         waves = math.pi * torch.arange(WAVES + 1, dtype=torch.float32)
         self.register_buffer("waves", waves[None, None, :, None], persistent=False)
+        # A quarter turn to the left.
+        quarter = torch.tensor([[0.0, -1.0], [1.0, 0.0]])
+        self.register_buffer("quarter", quarter, persistent=False)
         longest = max(TURN_TAPS)
-        # Sums over each of TURN_TAPS of turns, and of how many of them there are.
-        kernels = torch.zeros(2 * len(TURN_TAPS), 2, longest)
-        for index, taps in enumerate(TURN_TAPS):
+        # Sums of turns in each plane over each of TURN_TAPS, and of how many of them there are.
+        count = PLANES * len(TURN_TAPS)
+        kernels = torch.zeros(2 * count, PLANES + 1, longest)
+        for scale, taps in enumerate(TURN_TAPS):
             inside = slice((longest - taps) // 2, (longest + taps) // 2)
-            kernels[2 * index, 0, inside] = 1.0
-            kernels[2 * index + 1, 1, inside] = 1.0
+            for plane in range(PLANES):
+                row = PLANES * scale + plane
+                kernels[row, plane, inside] = 1.0
+                kernels[count + row, PLANES, inside] = 1.0
+        decay = torch.exp(-STEP_S / LAG_S * torch.arange(LAG_TAPS - 1.0, -1.0, -1.0))
+        gains = torch.tensor([1.0, 1.0, 1.0, UP_PER_AHEAD]) * (1.0 - math.exp(-STEP_S / LAG_S))
+        self.register_buffer("lag", torch.diag(gains)[:, :, None] * decay, persistent=False)
         self.register_buffer("kernels", kernels, persistent=False)
 
     def forward(
@@ -73,38 +90,48 @@ class Geometry(nn.Module):
         real = real.unsqueeze(1)
         v, raw, mask = self._velocity(x, times_s, real, full_yaw_radps)
         count = mask.sum(2, keepdim=True)
-        vx, vy, vz = v[:, 0:1], v[:, 1:2], v[:, 2:3]
-        speed = _length(v[:, :2], 1e-8) * mask
+        vx, vy, vz = torch.split(v, 1, 1)
         travel = _length(v, 1e-8) * mask
         total = travel.sum(2, keepdim=True).clamp(min=0.5)
         level = total / count + 0.02
 
         # The chord from the first place to the last is the x axis of all that follows.
-        chord = v[:, :2].sum(2, keepdim=True)
+        flat = v[:, :2]
+        chord = flat.sum(2, keepdim=True)
         chord_length = _length(chord, 1e-6)
         axis = chord / chord_length
-        c, s = axis[:, 0:1], axis[:, 1:2]
-        along, across = c * vx + s * vy, c * vy - s * vx
+        axes = torch.cat([axis, torch.matmul(self.quarter, axis), self._main_axis(flat, axis)], 2)
+        turned = torch.matmul(axes.transpose(1, 2), flat)
+        ahead = turned[:, 2:]
+        local = torch.cat([turned, vz], 1)
 
-        step = self._turns(v[:, :2], speed) * mask
-        by_way = speed / speed.sum(2, keepdim=True).clamp(min=0.1)
+        # Shapes lie in the horizontal plane, or in the vertical one that most of the motion is in.
+        # Pilots shape what the vehicle flies, and their sticks lead it.
+        flown = F.conv1d(F.pad(torch.cat([flat, ahead, vz], 1), (LAG_TAPS - 1, 0)), self.lag)
+        fx, fy, f_ahead, f_up = torch.split(flown, 1, 1)
+        planes = torch.cat([vx, fx, f_ahead, vy, fy, f_up], 1)
+        squares = planes * planes
+        speed = torch.sqrt(squares[:, :3] + squares[:, 3:] + 1e-8) * mask
+        step = self._turns(planes, speed) * mask
+        by_way = travel / travel.sum(2, keepdim=True).clamp(min=0.1)
         by_time = mask / count
         heading = torch.cumsum(step, 2)
         heading = (heading - (heading * by_way).sum(2, keepdim=True)) * mask
         sums = F.conv1d(torch.cat([step, mask], 1), self.kernels, padding=max(TURN_TAPS) // 2)
-        turn = sums[:, 0::2] / sums[:, 1::2].clamp(min=1.0) * mask / STEP_S
-        relative = torch.cat([along, across, vz, speed, raw[:, :2]], 1) / level
-        wz = raw[:, 2:3]
-        path = torch.cumsum(torch.cat([along, across, vz], 1), 2) / total
+        turn = sums[:, :6] / sums[:, 6:].clamp(min=1.0) * mask / STEP_S
+        flat_speed = speed[:, :1]
+        raw, wz = torch.split(raw, [2, 1], 1)
+        relative = torch.cat([local, flat_speed, raw], 1) / level
+        path = torch.cumsum(local, 2) / total
         path = (path - (path * by_time).sum(2, keepdim=True)) * mask
 
         channels = torch.cat(
             [
                 relative,
-                speed,
+                flat_speed,
                 heading / math.pi,
-                turn,
-                turn[:, :1] / (speed + STILL) * level,
+                turn[:, :4],
+                turn[:, :1] / (flat_speed + STILL) * level,
                 path * 4.0,
                 wz,
                 mask * times_s[:, ::STRIDE].unsqueeze(1) / 4.0,
@@ -119,18 +146,31 @@ class Geometry(nn.Module):
                 wz,
                 heading * heading,
                 F.relu(turn),
-                relative[:, 2:3].abs(),
+                relative[:, 3:4].abs(),
                 wz * wz,
             ],
             1,
         )
-        shares = torch.stack([by_way, by_time], 1)
-        summary = self._summary(signals, shares, step, count, total, chord_length)
+        # Of the horizontal motion, the share along its main axis: 1 in a vertical plane.
+        in_plane = (ahead * ahead).sum(2, keepdim=True) / (
+            (flat_speed * flat_speed).sum(2, keepdim=True) + 0.01
+        )
+        sizes = torch.cat(
+            [
+                total,
+                level,
+                count * STEP_S,
+                chord_length / total + 0.01,
+                step.abs().sum(2, keepdim=True) + 0.01,
+                (1.0 - in_plane).clamp(min=0.0) + 0.01,
+            ],
+            1,
+        ).squeeze(2)
+        summary = self._summary(signals, torch.stack([by_way, by_time], 1), sizes)
         return channels, mask, summary
 
-    @staticmethod
     def _velocity(
-        x: Tensor, times_s: Tensor, real: Tensor, full_yaw_radps: Tensor
+        self, x: Tensor, times_s: Tensor, real: Tensor, full_yaw_radps: Tensor
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Smoothed sticks (B, 4, T) in the frame of the first heading, and as the pad sends them.
 
@@ -138,79 +178,74 @@ class Geometry(nn.Module):
             vx vy vz (B, 3, T / STRIDE) in a frame that does not turn with the vehicle; vx and vy as
             they are with the yaw rate in rad/s; the mask.
         """
-        vx, vy = x[:, 0:1], x[:, 1:2]
-        turning = x[:, 3:] * full_yaw_radps[:, None, None]
+        flat, vz, wz = torch.split(x, [2, 1, 1], 1)
+        turning = wz * full_yaw_radps[:, None, None]
         # A stick is held until the next one, so a step turns by the stick at its beginning.
-        steps = F.pad(turning[:, 0, :-1] * (times_s[:, 1:] - times_s[:, :-1]), (1, 0))
-        yaw = torch.cumsum(steps, 1).unsqueeze(1)
-        c, s = torch.cos(yaw), torch.sin(yaw)
-        straight = [c * vx - s * vy, s * vx + c * vy, x[:, 2:3]]
-        stacked = torch.cat([*straight, x[:, :2], turning, real], 1)
+        held = turning[:, 0, :-1] * (times_s[:, 1:] - times_s[:, :-1])
+        yaw = torch.cumsum(F.pad(held, (1, 0)), 1).unsqueeze(1)
+        straight = torch.cos(yaw) * flat + torch.sin(yaw) * torch.matmul(self.quarter, flat)
+        stacked = torch.cat([straight, vz, flat, turning, real], 1)
         means = F.avg_pool1d(stacked, SMOOTH_TAPS, STRIDE, SMOOTH_TAPS // 2)
         mask = real[:, :, ::STRIDE]
-        means = means[:, :6] / means[:, 6:].clamp(min=1.0 / SMOOTH_TAPS) * mask
-        return means[:, :3], means[:, 3:], mask
+        v, raw, share = torch.split(means, [3, 3, 1], 1)
+        scale = mask / share.clamp(min=1.0 / SMOOTH_TAPS)
+        return v * scale, raw * scale, mask
 
     @staticmethod
-    def _turns(v: Tensor, speed: Tensor) -> Tensor:
-        """Angles (B, 1, T) from each direction to the next; of a resting stick about nothing."""
-        a, b = v[:, :, :-1], v[:, :, 1:]
-        dot = (a * b).sum(1, keepdim=True)
-        cross = a[:, 0:1] * b[:, 1:2] - a[:, 1:2] * b[:, 0:1]
-        energy = speed[:, :, :-1] * speed[:, :, 1:]
-        # The tangent of half the angle: no quadrants, and going straight back turns to no side.
-        half = torch.atan(cross / (energy + dot + BACK))
-        turns = 2.0 * half * energy / (energy + STILL * STILL)
-        return F.pad(turns, (1, 0))
+    def _main_axis(v: Tensor, guess: Tensor) -> Tensor:
+        """The direction (B, 2, 1) that most of a horizontal motion (B, 2, T) is along.
 
-    def _summary(
-        self,
-        signals: Tensor,
-        shares: Tensor,
-        step: Tensor,
-        count: Tensor,
-        total: Tensor,
-        chord: Tensor,
-    ) -> Tensor:
-        """Features (B, n) of whole windows: cosine coefficients of each signal, and sizes.
+        By powers of the matrix of second moments, from a guess that also gives it its sign.
+        """
+        moments = torch.matmul(v, v.transpose(1, 2))
+        moments = moments / (moments[:, 0:1, 0:1] + moments[:, 1:2, 1:2] + 1e-6)
+        squared = torch.matmul(moments, moments)
+        axis = torch.matmul(torch.matmul(squared, squared), guess)
+        return axis / _length(axis, 1e-9)
+
+    @staticmethod
+    def _turns(planes: Tensor, speed: Tensor) -> Tensor:
+        """Angles (B, PLANES, T) from each direction to the next; of a resting stick about nothing.
 
         Args:
-            signals: (B, S, T), the first `SIGNED` of them signed.
+            planes: (B, 2 PLANES, T) the first component in each of the planes, then the second.
+            speed: (B, PLANES, T) in each.
+        """
+        a, b = planes[:, :, :-1], planes[:, :, 1:]
+        ax, ay = torch.split(a, PLANES, 1)
+        bx, by = torch.split(b, PLANES, 1)
+        energy = speed[:, :, :-1] * speed[:, :, 1:]
+        # The tangent of half the angle: no quadrants, and going straight back turns to no side.
+        half = torch.atan((ax * by - ay * bx) / (energy + ax * bx + ay * by + BACK))
+        return F.pad(half * energy / (0.5 * energy + 0.5 * STILL * STILL), (1, 0))
+
+    def _summary(self, signals: Tensor, shares: Tensor, sizes: Tensor) -> Tensor:
+        """Features (B, SUMMARY) of whole windows: cosine coefficients of each signal, and sizes.
+
+        Args:
+            signals: (B, SIGNALS, T), the first `SIGNED` of them signed.
             shares: (B, 2, 1, T) of each step in the way and in the time; each sums to 1.
-            step: (B, 1, T) turns.
-            count: (B, 1, 1) steps.
-            total: (B, 1, 1) way.
-            chord: (B, 1, 1) its end's distance from its beginning.
+            sizes: (B, n) positive, over `n` orders of magnitude; the third is seconds.
         """
         middle = torch.cumsum(shares, 3) - 0.5 * shares
         waves = (torch.cos(middle * self.waves) * shares).flatten(1, 2)
         coefficients = torch.matmul(waves, signals.transpose(1, 2))
         means = coefficients[:, WAVES + 1]
-        seconds = count[:, :, 0] * STEP_S
-        left = means[:, 11:13] * seconds
-        right = left - means[:, 1:3] * seconds
+        # Turns to the left and to the right, at both scales and in each plane.
+        turns = slice(PLANES, 3 * PLANES)
+        left = means[:, SIGNED:][:, turns] * sizes[:, 2:3]
+        right = left - means[:, turns] * sizes[:, 2:3]
         one_way = torch.cat([torch.minimum(left, right), torch.maximum(left, right)], 1)
-        sizes = torch.cat(
-            [
-                one_way + 0.02,
-                coefficients[:, 0, 10:11] + 1e-4,
-                total[:, :, 0],
-                total[:, :, 0] / count[:, :, 0],
-                seconds,
-                chord[:, :, 0] / total[:, :, 0] + 0.01,
-                step.abs().sum(2) + 0.01,
-            ],
-            1,
-        )
         return torch.cat(
             [
                 coefficients.flatten(1),
                 coefficients[:, :, :SIGNED].abs().flatten(1),
                 # Padding is 0, so it must count where there is none as well.
-                signals[:, :3].amax(2).clamp(min=0.0),
-                signals[:, :3].amin(2).clamp(max=0.0),
+                signals[:, : 3 * PLANES].amax(2).clamp(min=0.0),
+                signals[:, : 3 * PLANES].amin(2).clamp(max=0.0),
                 one_way,
-                torch.log(sizes),
+                torch.log(torch.cat([one_way.clamp(min=0.0) + 0.02, sizes], 1)),
+                torch.log(coefficients[:, 0, SIGNED : SIGNED + PLANES] + 1e-4),
             ],
             1,
         )

@@ -101,16 +101,16 @@ class Encoder(nn.Module):
         for convolution in self.convolutions:
             x, mask = convolution(x, mask)
         states, _ = self.gru(self.dropout(x.transpose(1, 2)))
-        mask = mask.transpose(1, 2)
-        pooled = []
-        for kind in self.pooling:
-            if kind == "mean":
-                pooled.append((states * mask).sum(1) / mask.sum(1))
-            elif kind == "largest":
-                pooled.append((states * mask - 2.0 * (1.0 - mask)).amax(1))
-            else:
-                # The state at the last real step: the only one that no real one follows.
-                pooled.append((states * (mask - F.pad(mask[:, 1:], (0, 0, 0, 1)))).sum(1))
+        shares = []
+        if "last" in self.pooling:
+            # The last real step: the only one that no real one follows.
+            shares.append(mask - F.pad(mask[:, :, 1:], (0, 1)))
+        if "mean" in self.pooling:
+            shares.append(mask / mask.sum(2, keepdim=True))
+        pooled = [torch.matmul(torch.cat(shares, 1), states).flatten(1)] if shares else []
+        if "largest" in self.pooling:
+            # States are within -1 and 1.
+            pooled.append((states + 2.0 * (mask.transpose(1, 2) - 1.0)).amax(1))
         return torch.cat(pooled, 1)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from services.classifier.model import OnnxModel
 from training.card import card_of
-from training.export import export
+from training.export import export, save
 from training.fit import FULL_YAW_RADPS, Budget, Epoch, Fitted, Training
 from training.labels import PRIMITIVES
 from training.people import Share, people_of
@@ -210,6 +210,7 @@ def train(
     fitted = run.fitted()
     path = out / f"{MODEL_NAME}.onnx"
     sha256 = export(fitted, PRIMITIVES, MODEL_NAME, path)
+    save(fitted, path.with_suffix(".pt"))
     model = OnnxModel(path)
 
     test = people("test", preset.test, 2)

@@ -17,12 +17,13 @@ IntArray = NDArray[np.int64]
 Text = NDArray[np.str_]
 
 NONE_INDEX = CLASSES.index(NONE)
-EARLY_SAMPLES = 40
-"""Most windows hold 0.8 s at least; what came before that tells little, and is asked for once."""
-WHOLE_SHARE = 0.35
-SHORTER_SHARE = 0.3
-"""Of the cut windows, those that may be as short as a model may be asked."""
-HEAD_CUT_SHARE = 0.25
+ASKED_SAMPLES = (SHORTEST_SAMPLES, WINDOW_SAMPLES + 20)
+"""When a service asks does not depend on how long a primitive will last: cuts must not either, or
+a short window would tell of a short primitive."""
+WHOLE_SHARE = 0.3
+HEAD_CUT_SHARE = 0.2
+HEADLESS_SAMPLES = 80
+"""What is left of a window without its beginning, at least."""
 MIRROR_SHARE = 0.5
 SPLICE_SHARE = 0.15
 """Windows that begin with the end of another primitive, flown into this one without a pause."""
@@ -160,19 +161,18 @@ def _cut(track: Array32, rng: np.random.Generator) -> Array32:
     """A window that ends at a random time, and may lack its beginning."""
     end = len(track)
     if rng.random() > WHOLE_SHARE:
-        least = SHORTEST_SAMPLES if rng.random() < SHORTER_SHARE else EARLY_SAMPLES
-        if end > least:
-            end = int(rng.integers(least, end + 1))
+        end = min(end, int(rng.integers(*ASKED_SAMPLES)))
     begin = max(0, end - WINDOW_SAMPLES)
-    if rng.random() < HEAD_CUT_SHARE and end - begin > 2 * EARLY_SAMPLES:
-        begin = int(rng.integers(begin, end - 2 * EARLY_SAMPLES))
+    if rng.random() < HEAD_CUT_SHARE and end - begin > HEADLESS_SAMPLES:
+        begin = int(rng.integers(begin, end - HEADLESS_SAMPLES))
     return track[begin:end]
 
 
 def _of_nothing(track: Array32, rng: np.random.Generator) -> Array32:
     """A window of no primitive, cut at a random time."""
-    end = int(rng.integers(min(SHORTEST_SAMPLES, len(track)), len(track) + 1))
-    window = track[:end]
+    window = track
+    if rng.random() > WHOLE_SHARE:
+        window = track[: int(rng.integers(*ASKED_SAMPLES))]
     if rng.random() < MOTION_SHARE:
         motion = window[newest_motion(window, MODEL_RATE_HZ)]
         if len(motion) >= SHORTEST_SAMPLES:

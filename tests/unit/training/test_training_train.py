@@ -56,7 +56,8 @@ class Stopped(Told):
 def test_a_run_leaves_a_model_its_card_and_its_figures(tmp_path: Path) -> None:
     told = Told()
     run = train("quick", 7, tmp_path, told)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["README.md", "intent.json", "intent.onnx"]
+    left = sorted(p.name for p in tmp_path.iterdir())
+    assert left == ["README.md", "intent.json", "intent.onnx", "intent.pt"]
     model = OnnxModel(tmp_path / "intent.onnx")
     assert model.name == f"intent-{run.sha256[:8]}"
     assert model.labels == PRIMITIVES
