@@ -84,9 +84,9 @@ class Encoder(nn.Module):
         self.standardise = nn.BatchNorm1d(channels)
         self.convolutions = nn.ModuleList(
             [
-                _Convolution(channels, width, 7, 1),
+                _Convolution(channels, width, 7, 2),
                 _Convolution(width, width, 5, 2),
-                _Convolution(width, width, 5, 2),
+                _Convolution(width, width, 5, 1),
                 _Convolution(width, width, 3, 1),
             ]
         )
