@@ -16,6 +16,7 @@ EARLY_F1 = {"1.0 s": 0.70, "1.5 s": 0.80, "2.0 s": 0.88, "3.0 s": 0.93}
 CALIBRATION_ERROR = 0.03
 NONE_AUROC = 0.97
 ROBUST_POINTS = 2.0
+GAINED_POINTS, LOST_POINTS = 3.0, 0.5
 P50_S, P99_S = 0.2e-3, 0.3e-3
 
 
@@ -225,6 +226,31 @@ def _robust(results: Results) -> list[Bar]:
     return rows
 
 
+def _adapted(results: Results) -> list[Bar]:
+    """What five performances a primitive do for the person they are of, and cost the others."""
+    people = [one for found in results.judged[OURS].values() for one in found["adapted"]]
+    gained, lost = (
+        estimate(100.0 * sign * (one[f"{who}_after"] - one[f"{who}_before"]) for one in people)
+        for who, sign in (("own", 1.0), ("others", -1.0))
+    )
+    return [
+        Bar(
+            f"F1 gained by 5 examples a class, {len(people)} unusual people",
+            f">= {GAINED_POINTS:g} points",
+            gained.text(1),
+            "-",
+            at_least(gained.mean, GAINED_POINTS, 1),
+        ),
+        Bar(
+            "F1 that others lose by it",
+            f"<= {LOST_POINTS:g} points",
+            lost.text(1),
+            "-",
+            at_most(lost.mean, LOST_POINTS, 1),
+        ),
+    ]
+
+
 def _human(results: Results) -> list[Bar]:
     rows = []
     for human in HUMAN_SETS:
@@ -272,6 +298,6 @@ def bars(results: Results) -> list[Bar]:
     """Every demand in order; only those on people if our network has not been run."""
     rows: list[Bar] = []
     if OURS in results.judged:
-        for part in (_calibrated, _families, _early, _trust, _robust):
+        for part in (_calibrated, _families, _early, _trust, _robust, _adapted):
             rows += part(results)
     return rows + _human(results) + _speed(results)

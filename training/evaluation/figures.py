@@ -13,17 +13,22 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
+from training.dataset.figures import draw_lengths
 from training.evaluation.bars import EARLY_F1, FAMILY_F1
 from training.evaluation.measures import Tally
 from training.evaluation.names import CALIBRATED, FAMILY, MOMENTS, OURS, THESIS, WHOLE
 from training.evaluation.results import Results
 from training.evaluation.tables import Table, is_met
+from training.generator.dataset import THESIS as THESIS_PEOPLE
+from training.generator.dataset import counts_of, populate
 from training.labels import PRIMITIVES
 
 COLOURS = ("#000000", "#e69f00", "#56b4e9", "#009e73", "#cc79a7", "#0072b2", "#d55e00", "#999999")
 """Okabe and Ito's, told apart by colour-blind eyes; ours is black and bold."""
 MARKS = ("o", "s", "^", "v", "D", "P", "X", "*")
 DPI = 110
+LENGTHS_OF = 40
+"""So many people's primitives are drawn by their lengths."""
 
 Drawn = tuple[str, str]
 
@@ -239,6 +244,15 @@ def _picture(table: Table, path: Path) -> str:
     return f"{table.title}. {table.caption}"
 
 
+def _lengths(path: Path) -> str:
+    people = populate(THESIS_PEOPLE, LENGTHS_OF, counts_of(1.0), 0)
+    draw_lengths(people, path)
+    return (
+        "Figure 4.1 of the thesis, remade: sizes of primitives of calibrated people"
+        f" (n = {len(people)}, the thesis' counts by class)."
+    )
+
+
 def draw(results: Results, table: Table, out: Path) -> list[Drawn]:
     """Draw what there are results for; (file name, caption) of each figure."""
     wanted: list[tuple[str, Callable[[Path], str]]] = []
@@ -247,6 +261,7 @@ def draw(results: Results, table: Table, out: Path) -> list[Drawn]:
     if results.judged:
         wanted.append(("early.png", lambda path: _early(results, path)))
         wanted.append(("families.png", lambda path: _families(results, path)))
+        wanted.append(("lengths.png", _lengths))
     if OURS in results.models:
         wanted.append(("reliability.png", lambda path: _reliability(results, path)))
     if {OURS, THESIS} & set(results.models):

@@ -17,12 +17,15 @@ from training.evaluation.hover import HOLD_S, bothered
 from training.evaluation.measures import tally
 from training.evaluation.names import CALIBRATED, KNOWN, MOMENTS, WHOLE
 from training.evaluation.ours import Ours
+from training.finetune import adaptation_study
 from training.generator.dataset import holds
 from training.windows import examples_of, seen_after
 
 PERIODS_S = (1.0, 0.1)
 """The shortest and the longest T of the service."""
 
+ADAPTED = 4
+"""So many people a seed show five performances of each primitive of their own."""
 DISTORTED = 240
 """So many performances are distorted in each way."""
 
@@ -96,6 +99,14 @@ def _of_ours(
             found = ours.meant(seen_after(examples_of(people), after)).tolist()
             meant.setdefault(kind, []).extend(found)
             meant[f"{kind} {moment}"] = found
+    adapted = adaptation_study(
+        ours.fitted,
+        examples_of(fold.lesson.training),
+        examples_of(fold.tests[KNOWN]),
+        seed,
+        people=ADAPTED,
+        candidates=3 * ADAPTED,
+    )
     ours.export(model_path)
     model = OnnxModel(model_path)
     hold_seed = int(np.random.SeedSequence((seed, 9)).generate_state(1)[0])
@@ -106,6 +117,7 @@ def _of_ours(
             moment: _auroc(meant[f"four{moment}"], meant[f"none{moment}"])
             for moment in ("", *(f" {name}" for name in MOMENTS))
         },
+        "adapted": [vars(person) for person in adapted],
         "hover": {str(period_s): vars(bothered(model, held, period_s)) for period_s in PERIODS_S},
     }
 

@@ -9,7 +9,7 @@ from cli.main import main
 from common.clock import ManualClock, nanoseconds
 from services.classifier.model import Answer
 from training.dataset.primitive import Primitive
-from training.evaluation import folds
+from training.evaluation import figures, folds
 from training.evaluation.bars import at_least, at_most, bars
 from training.evaluation.contenders import CONTENDERS, contender
 from training.evaluation.distortions import DISTORTIONS
@@ -145,6 +145,9 @@ def result(right: float, families: list[str]) -> dict:
         "distorted": {name: counts(right - 0.01) for name in DISTORTIONS},
         "history": [(1.0, 1.1), (0.5, 0.6)],
         "none": {"": {"auroc": 0.98, "n": 800}},
+        "adapted": [
+            {"own_before": 0.8, "own_after": 0.85, "others_before": 0.9, "others_after": 0.89}
+        ],
         "hover": {
             period: dict.fromkeys(("asked", "people", "intents", "suggestions", "bothered"), 0)
             for period in ("1.0", "0.1")
@@ -167,13 +170,16 @@ def test_a_bar_is_met_only_above_every_peer() -> None:
     assert verdicts["F1, family left out: wild"] == "not met: 0.010 below the best peer"
     assert verdicts["none against the four, AUROC"] == "met"
     assert verdicts["people: GunPoint, accuracy"] == "met"
+    assert verdicts["F1 gained by 5 examples a class, 2 unusual people"] == "met"
+    assert verdicts["F1 that others lose by it"] == "over by 0.5"
     verdicts = {bar.question: bar.verdict for bar in bars(results(0.98, 0.90))}
     assert verdicts["F1, calibrated people held out"] == "met"
     verdicts = {bar.question: bar.verdict for bar in bars(results(0.92, 0.95))}
     assert verdicts["F1, family left out: calm"] == "short by 0.010, 0.030 below the best peer"
 
 
-def test_the_report_is_markdown_html_and_pictures(tmp_path) -> None:
+def test_the_report_is_markdown_html_and_pictures(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(figures, "populate", populate)
     write(results(0.98, 0.90), tmp_path)
     text = (tmp_path / "report.md").read_text()
     assert "| F1, calibrated people held out | >= 0.97, above every peer |" in text
@@ -187,7 +193,8 @@ def test_the_report_is_markdown_html_and_pictures(tmp_path) -> None:
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_report_needs_no_network_of_ours(tmp_path) -> None:
+def test_a_report_needs_no_network_of_ours(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(figures, "populate", populate)
     found = results(0.98, 0.90)
     del found.judged[OURS]
     assert [table.title for table in write(found, tmp_path)][1] == (
