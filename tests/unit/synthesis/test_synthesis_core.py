@@ -253,6 +253,11 @@ def test_a_bad_fit_is_refused_with_its_field(primitive, points, field):
         {"min_extent_m": -1.0},
         {"min_radius_m": 20.0},
         {"max_doubt": 0.0},
+        {"fence_radius_m": 0.0},
+        {"min_height_m": 20.0},
+        {"half_width_m": -0.1},
+        {"margin_m": -0.1},
+        {"max_position_std_m": -1.0},
     ],
 )
 def test_a_configuration_that_makes_no_sense_is_refused(fields):
