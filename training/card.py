@@ -93,6 +93,6 @@ The {wide.name} population:
 - No person's sticks are in the data. How well it does on people is not known;
   `autocomplete train --finetune` adapts it to one.
 - The people held out here are of the same families as those it learned from.
-- Windows over 200 samples keep the newest 200.
-- A wide slow sine looks like an arc until its inflection is within the 4 s window.
+- Windows over 400 samples keep the newest 400.
+- A wide slow sine looks like an arc until its inflection is in sight.
 """

@@ -31,7 +31,7 @@ class Architecture:
     """Sizes, and what may be left out to see what it is worth.
 
     Attributes:
-        width: channels of the convolutions and units of the GRUs.
+        width: channels of the convolutions and units of the GRUs; 0 leaves both out.
         summary: units of the two layers that read the summary; 0 leaves it out.
         head: units of the head's hidden layer.
         dropout: of all dropout layers.
@@ -86,7 +86,7 @@ class Encoder(nn.Module):
             [
                 _Convolution(channels, width, 7, 2),
                 _Convolution(width, width, 5, 2),
-                _Convolution(width, width, 5, 1),
+                _Convolution(width, width, 5, 2),
                 _Convolution(width, width, 3, 1),
             ]
         )
@@ -150,13 +150,11 @@ class Network(nn.Module):
         super().__init__()
         self.architecture = a = architecture or Architecture()
         self.geometry = Geometry()
-        self.encoder = Encoder(
-            Geometry.CHANNELS if a.geometry else len(Geometry.STICKS),
-            a.width,
-            a.dropout,
-            a.pooling,
-        )
-        features = self.encoder.features
+        features = 0
+        if a.width:
+            channels = Geometry.CHANNELS if a.geometry else len(Geometry.STICKS)
+            self.encoder = Encoder(channels, a.width, a.dropout, a.pooling)
+            features += self.encoder.features
         if a.summary:
             # Some features hardly vary: without a floor their rounding errors would count.
             self.standardise = nn.BatchNorm1d(Geometry.SUMMARY, eps=1e-4)
@@ -191,13 +189,14 @@ class Network(nn.Module):
         """
         with torch.no_grad():
             x, mask, summary = self.geometry(sticks, times_s, lengths, full_yaw_radps)
-        if not self.architecture.geometry:
-            x = x[:, Geometry.STICKS]
-        features = self.encoder(x, mask)
+        features = []
+        if self.architecture.width:
+            features.append(
+                self.encoder(x if self.architecture.geometry else x[:, Geometry.STICKS], mask)
+            )
         if self.architecture.summary:
-            read = self.reader(self.standardise(summary).clamp(-LARGEST, LARGEST))
-            features = torch.cat([features, read], 1)
-        out = self.head(features)
+            features.append(self.reader(self.standardise(summary).clamp(-LARGEST, LARGEST)))
+        out = self.head(torch.cat(features, 1))
         logits, meant = out[:, :-1], out[:, -1]
         if self.architecture.decisions:
             # log(sigmoid(z)) = -softplus(-z): the probability of a chain is the sum of these.

@@ -20,6 +20,9 @@ NONE_INDEX = CLASSES.index(NONE)
 ASKED_SAMPLES = (SHORTEST_SAMPLES, WINDOW_SAMPLES + 20)
 """When a service asks does not depend on how long a primitive will last: cuts must not either, or
 a short window would tell of a short primitive."""
+EARLY_SAMPLES = (SHORTEST_SAMPLES, 160)
+EARLY_SHARE = 0.5
+"""Of the cuts, those in the first 3.2 s: an early answer is worth more than a late one."""
 WHOLE_SHARE = 0.3
 HEAD_CUT_SHARE = 0.2
 HEADLESS_SAMPLES = 80
@@ -27,7 +30,7 @@ HEADLESS_SAMPLES = 80
 MIRROR_SHARE = 0.5
 SPLICE_SHARE = 0.15
 """Windows that begin with the end of another primitive, flown into this one without a pause."""
-SPLICE_SAMPLES = (20, 75)
+SPLICE_SAMPLES = (20, 250)
 SETTLED_SAMPLES = 60
 """The newer primitive is asked for once 1.2 s of it are seen."""
 JOINT_SAMPLES = 15
@@ -157,11 +160,16 @@ def random_tracks(
     return tracks
 
 
+def _asked(rng: np.random.Generator) -> int:
+    """After how many samples a service asks."""
+    return int(rng.integers(*(EARLY_SAMPLES if rng.random() < EARLY_SHARE else ASKED_SAMPLES)))
+
+
 def _cut(track: Array32, rng: np.random.Generator) -> Array32:
     """A window that ends at a random time, and may lack its beginning."""
     end = len(track)
     if rng.random() > WHOLE_SHARE:
-        end = min(end, int(rng.integers(*ASKED_SAMPLES)))
+        end = min(end, _asked(rng))
     begin = max(0, end - WINDOW_SAMPLES)
     if rng.random() < HEAD_CUT_SHARE and end - begin > HEADLESS_SAMPLES:
         begin = int(rng.integers(begin, end - HEADLESS_SAMPLES))
@@ -172,7 +180,7 @@ def _of_nothing(track: Array32, rng: np.random.Generator) -> Array32:
     """A window of no primitive, cut at a random time."""
     window = track
     if rng.random() > WHOLE_SHARE:
-        window = track[: int(rng.integers(*ASKED_SAMPLES))]
+        window = track[: _asked(rng)]
     if rng.random() < MOTION_SHARE:
         motion = window[newest_motion(window, MODEL_RATE_HZ)]
         if len(motion) >= SHORTEST_SAMPLES:
@@ -196,10 +204,10 @@ def spliced(before: Array32, after: Array32, rng: np.random.Generator) -> Array3
     """
     # Without lead-out and lead-in, which are a pause.
     before, after = before[:-JOINT_SAMPLES], after[JOINT_SAMPLES:]
-    share = int(rng.integers(*SPLICE_SAMPLES))
-    if len(before) < share or len(after) < max(SETTLED_SAMPLES, share):
+    share = min(int(rng.integers(*SPLICE_SAMPLES)), len(before))
+    if share < SPLICE_SAMPLES[0] or len(after) < SETTLED_SAMPLES:
         return None
-    end = int(rng.integers(max(SETTLED_SAMPLES, share), len(after) + 1))
+    end = int(rng.integers(SETTLED_SAMPLES, len(after) + 1))
     out = before[-JOINT_SAMPLES:].mean(axis=0)
     into = after[:JOINT_SAMPLES].mean(axis=0)
     speeds = math.hypot(out[0], out[1]), math.hypot(into[0], into[1])

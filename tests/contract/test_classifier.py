@@ -28,7 +28,7 @@ from payloads import assert_bad_input_is_dropped_and_counted
 PRIMITIVES = {"line", "arc", "sine", "helix"}
 PERIOD_S = 0.1
 STICK_HZ = 50.0
-WINDOW_S = 4.0
+WINDOW_S = 8.0
 UNSET = "unset"
 
 
