@@ -21,6 +21,7 @@ Texture = Literal[
     "roof",
     "wood",
     "metal",
+    "board",
 ]
 Shape = Literal["box", "cylinder", "sphere"]
 Primitive = Literal["line", "arc", "sine", "helix"]

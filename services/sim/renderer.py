@@ -32,6 +32,7 @@ SHADOW_PIXELS = 2048
 LLVMPIPE_THREADS = "0"
 """The drawing thread rasterises itself: a tenth cheaper, and other services need the other core."""
 
+_SIDES = np.asarray([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
 _create_context: Any = moderngl.create_context
 
 
@@ -111,9 +112,10 @@ class GlRenderer:
             program["from_world"] = tuple(from_world.T.ravel())
         self._textures.use(0)
         self._ground_light.use(1)
+        away_m = self._away_m(eye, from_world)
         # Near to far, so that what is hidden is not painted.
         for flock in self._flocks:
-            flock.draw(eye, from_world, 1)
+            flock.draw(away_m, 1)
         gl.disable(moderngl.CULL_FACE)
         for height_m, (vertices, layer, tint, dash_m) in self._ground:
             self._ground_program["height_m"] = height_m
@@ -130,7 +132,7 @@ class GlRenderer:
         gl.enable(moderngl.CULL_FACE | moderngl.BLEND)
         for pane in self._panes:
             # Far to near, so that nets are seen through nets.
-            pane.draw(eye, from_world, -1)
+            pane.draw(away_m, -1)
         self._finish()
         target.read_into(pixels, components=3)
         return pixels
@@ -164,22 +166,39 @@ class GlRenderer:
             program["extent"] = [tuple(each) for each in self._extent]
 
     def _load_bodies(self, bodies: tuple[Body, ...]) -> None:
-        panes = [body for body in bodies if body.texture in SEE_THROUGH]
-        solid = [body for body in bodies if body.texture not in SEE_THROUGH]
-        self._flocks = self._flocks_of(solid)
-        self._panes = self._flocks_of(panes)
-
-    def _flocks_of(self, bodies: list[Body]) -> list["_Flock"]:
-        flocks = []
-        for shape, mesh in self._meshes.items():
-            table = _table([body for body in bodies if body.shape == shape], self._layers)
-            if len(table):
+        self._flocks: list[_Flock] = []
+        self._panes: list[_Flock] = []
+        tables = [np.empty((0, 11), "f4")]
+        begin = 0
+        for flocks, is_pane in ((self._flocks, False), (self._panes, True)):
+            for shape, mesh in self._meshes.items():
+                alike = [
+                    body
+                    for body in bodies
+                    if body.shape == shape and (body.texture in SEE_THROUGH) == is_pane
+                ]
+                if not alike:
+                    continue
+                table = _table(alike, self._layers)
                 buffer = self._gl.buffer(table.tobytes(), dynamic=True)
-                flocks.append(
-                    _Flock(table, buffer, self._drawn(mesh, buffer), self._shadowing(mesh, buffer))
-                )
-                self._scene_objects += [flocks[-1].vertices, flocks[-1].shadow, buffer]
-        return flocks
+                drawn, shadow = self._drawn(mesh, buffer), self._shadowing(mesh, buffer)
+                rows = slice(begin, begin + len(table))
+                flocks.append(_Flock(table, rows, buffer, drawn, shadow))
+                self._scene_objects += [drawn, shadow, buffer]
+                tables.append(table)
+                begin += len(table)
+        whole = np.concatenate(tables).astype(np.float64)
+        self._centres_m = whole[:, :3]
+        self._radii_m = 0.5 * np.linalg.norm(whole[:, 7:10], axis=1)
+
+    def _away_m(self, eye: Array, from_world: Array) -> Array:
+        """How far each body is from the eye, (N,); infinitely if it is out of sight."""
+        # A plane of the view's pyramid is a sum of rows of the matrix; its normal is not of unit.
+        sides = from_world[3] + _SIDES @ from_world[:2]
+        lengths = np.linalg.norm(sides[:, :3], axis=1)
+        inside = (self._centres_m @ sides[:, :3].T + sides[:, 3]) / lengths
+        seen = (inside > -self._radii_m[:, None]).all(axis=1)
+        return np.where(seen, np.linalg.norm(self._centres_m - eye, axis=1), np.inf)
 
     def _drawn(self, mesh: Any, table: Any) -> Any:
         names = ("in_position", "in_normal", "in_uv", "in_across", "in_up")
@@ -275,27 +294,29 @@ class GlRenderer:
 
 @dataclass(frozen=True, eq=False)
 class _Flock:
-    """Bodies of one shape, drawn at once: a row of the table each, and its copy in OpenGL."""
+    """Bodies of one shape, drawn at once: a row of the table each, and its copy in OpenGL.
+
+    Attributes:
+        table: see `_table`.
+        rows: which of all bodies they are.
+        buffer: the table's copy.
+        vertices: draws it.
+        shadow: draws its shadows.
+    """
 
     table: Array
+    rows: slice
     buffer: Any
     vertices: Any
     shadow: Any
 
-    def draw(self, eye: Array, from_world: Array, order: int) -> None:
+    def draw(self, away_m: Array, order: int) -> None:
         """Draw those in sight, the nearest first (order 1) or last (-1)."""
-        centres = self.table[:, :3]
-        radii = 0.5 * np.linalg.norm(self.table[:, 7:10], axis=1)
-        # A plane of the view's pyramid is a sum of rows of the matrix; its normal is not of unit.
-        sides = np.stack([from_world[3] + sign * from_world[i] for i in (0, 1) for sign in (1, -1)])
-        lengths = np.linalg.norm(sides[:, :3], axis=1)
-        away = (centres @ sides[:, :3].T + sides[:, 3]) / lengths
-        seen = np.flatnonzero((away > -radii[:, None]).all(axis=1))
-        if not len(seen):
-            return
-        distance = np.linalg.norm(centres[seen] - eye, axis=1)
-        self.buffer.write(self.table[seen[np.argsort(order * distance)]].tobytes())
-        self.vertices.render(instances=len(seen))
+        away_m = away_m[self.rows]
+        nearest = np.argsort(away_m)[: np.count_nonzero(np.isfinite(away_m))]
+        if len(nearest):
+            self.buffer.write(self.table[nearest[::order]].tobytes())
+            self.vertices.render(instances=len(nearest))
 
 
 def view_of(camera: Camera, shot: Shot) -> tuple[Array, Array, Array]:

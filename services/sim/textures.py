@@ -207,28 +207,33 @@ def _post(generator: np.random.Generator) -> Picture:
 
 
 def _fence(generator: np.random.Generator) -> Picture:
-    """A panel 1.6 m high: a board of red and white fields below, a net above, a tape on top."""
+    """A net 1.1 m high with a tape on top."""
     colour = np.empty((CANVAS, CANVAS, 3), np.float32)
     colour[:] = (0.16, 0.18, 0.20)
     alpha = np.zeros((CANVAS, CANVAS), np.float32)
-    # Net: meshes of about 10 cm.
-    for at in range(0, CANVAS, 64):
-        alpha[at : at + 7, :] = 1.0
+    # Meshes of about 10 cm.
+    for at in range(0, CANVAS, 90):
+        alpha[at : at + 10, :] = 1.0
     for at in range(0, CANVAS, 42):
         alpha[:, at : at + 5] = 1.0
-    tape = slice(0, 44)
+    tape = slice(0, 62)
     alpha[tape] = 1.0
     colour[tape] = (0.96, 0.45, 0.05)
-    board = slice(724, CANVAS)
-    alpha[board] = 1.0
-    slope = np.arange(CANVAS)[None, :] + np.arange(CANVAS - 724)[:, None]
-    red = (slope // 128) % 2 == 0
-    colour[board] = np.where(red[..., None], (0.80, 0.08, 0.07), (0.93, 0.93, 0.91))
-    dirt = noise(generator, 16, 6)
-    colour[board] *= (0.72 + 0.4 * dirt[board])[..., None]
-    _spots(generator, colour[board], 120, (2, 6), (0.30, 0.27, 0.22))
-    colour[724:732] = 0.1
+    colour *= (0.85 + 0.3 * noise(generator, 16, 5))[..., None]
     return _picture(colour, alpha)
+
+
+def _board(generator: np.random.Generator) -> Picture:
+    """A board 0.5 m high and 2.5 m long, of red and white fields, dirty."""
+    colour = np.empty((CANVAS, CANVAS, 3), np.float32)
+    # Slanted by 45 deg in the world, where a row is a fifth as high as a column is wide.
+    slope = np.arange(CANVAS)[None, :] + 0.2 * np.arange(CANVAS)[:, None]
+    red = (slope // 128) % 2 == 0
+    colour[:] = np.where(red[..., None], (0.80, 0.08, 0.07), (0.93, 0.93, 0.91))
+    colour *= (0.72 + 0.4 * noise(generator, 16, 6))[..., None]
+    _spots(generator, colour, 160, (2, 8), (0.30, 0.27, 0.22))
+    colour[:24] = 0.1
+    return _picture(colour)
 
 
 def _soil(generator: np.random.Generator) -> Picture:
@@ -308,6 +313,7 @@ _PAINTERS: dict[
     "roof": (_roof, 2.5, 2.5),
     "wood": (_wood, 2.0, 2.0),
     "metal": (_metal, 2.0, 2.0),
+    "board": (_board, 2.5, None),
 }
 
 
