@@ -21,7 +21,7 @@ ASKED_SAMPLES = (SHORTEST_SAMPLES, WINDOW_SAMPLES + 20)
 """When a service asks does not depend on how long a primitive will last: cuts must not either, or
 a short window would tell of a short primitive."""
 EARLY_SAMPLES = (SHORTEST_SAMPLES, 160)
-EARLY_SHARE = 0.5
+EARLY_SHARE = 0.2
 """Of the cuts, those in the first 3.2 s: an early answer is worth more than a late one."""
 WHOLE_SHARE = 0.3
 HEAD_CUT_SHARE = 0.2
