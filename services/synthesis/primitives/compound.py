@@ -33,7 +33,7 @@ CHORD_M = 0.2
 """The way is cut into chords of this length; change points are found to about one of them."""
 BOUND_STD_M = CHORD_M
 """Standard error of a segment's length: each of its ends is off by about a chord."""
-MIN_SIGMA_M = 0.004
+MIN_SIGMA_M = 0.005
 """Of the points; what is smoother is not trusted to be better."""
 SMOOTH = 2.5
 """A hand errs alike over half a metre: so many chords are one observation."""
@@ -121,9 +121,10 @@ class Compound(Shape):
         flown_m = segments[-1].length_m
         return cls(
             quality=Quality(
-                rms_m=math.hypot(off_m, float(heights.std())),
+                rms_m=math.hypot(max(off_m, MIN_SIGMA_M), float(heights.std())),
                 extent_m=CHORD_M * bounds[-1],
-                count=len(xy),
+                # The chords bound what is known, however many points there are.
+                count=math.ceil(bounds[-1] / SMOOTH),
                 estimate=round_m,
                 estimate_std=BOUND_STD_M,
                 doubt=BOUND_STD_M / max(round_m, 1e-9),
