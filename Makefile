@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --disable-pip-version-check -c constraints.t
 SCRIPTS := .ci/run deploy/install
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo up check test test-compose bench fits flight properties people train evaluate picture shapes lock docs format clean
+.PHONY: help setup demo up check test test-compose bench bench-simulator fits flight properties people train evaluate picture shapes lock docs format clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -75,6 +75,9 @@ fits: setup $(VENV)/.all ## fits of hidden shapes beside an oracle, their errors
 
 bench: setup $(VENV)/.all ## rates and latencies of the whole chain, as a table
 	$(BIN)/python tests/performance/bench.py $(ARGS)
+
+bench-simulator: setup $(VENV)/.all ## how fast the simulator is beside others, and 10 minutes of it
+	$(BIN)/python tests/performance/simulator.py $(ARGS)
 
 # --- making --------------------------------------------------------------------------------------
 

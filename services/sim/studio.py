@@ -2,7 +2,7 @@
 
 import logging
 import threading
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from typing import Literal
 
@@ -15,6 +15,10 @@ from services.sim.renderer import GlRenderer, NoOpenGlError, jpeg_of
 from services.sim.stage import Scene
 
 log = logging.getLogger(__name__)
+
+LONGEST_WAIT_NS = 30_000_000
+"""Less than the front camera's period, so of its shots the newest alone waits; of those of the
+camera below one more, for two may come while a front picture is drawn."""
 
 Choice = Literal["auto", "gl", "tiny", "none"]
 
@@ -53,7 +57,7 @@ def photograph(renderer: Renderer, camera: Camera, shot: Shot, quality: int) -> 
 
 
 class Studio:
-    """Cameras that never hold up physics: the newest shot of each waits, older ones are dropped.
+    """Cameras that never hold up physics: shots that wait too long are dropped.
 
     Args:
         choice: of the renderer.
@@ -74,7 +78,7 @@ class Studio:
         self._quality = quality
         self._publish = publish
         self._wake = threading.Condition()
-        self._shots: dict[str, Shot] = {}
+        self._shots: deque[Shot] = deque()
         self._scene: Scene | None = None
         self._stopping = False
         self._ready = False
@@ -90,16 +94,15 @@ class Studio:
         with self._wake:
             self._scene = scene
             self._shots.clear()
-            self._wake.notify()
+            self._wake.notify_all()
 
     def take(self, shots: Sequence[Shot]) -> None:
-        """Have pictures taken soon, or not at all if newer ones are asked for first."""
+        """Have pictures taken soon, or not at all if they wait too long."""
         with self._wake:
             for shot in shots:
-                if shot.topic in self._shots and self._ready:
-                    self.dropped[shot.topic] += 1
-                self._shots[shot.topic] = shot
-            self._wake.notify()
+                self._shots.append(shot)
+                self._drop_before(shot.topic, shot.stamp_ns - LONGEST_WAIT_NS)
+            self._wake.notify_all()
 
     def finish(self) -> None:
         """Wait until all pictures that were asked for are taken."""
@@ -111,7 +114,7 @@ class Studio:
         """Stop, after the picture that is being taken."""
         with self._wake:
             self._stopping = True
-            self._wake.notify()
+            self._wake.notify_all()
         self._thread.join()
 
     def _run(self) -> None:
@@ -141,11 +144,18 @@ class Studio:
             if self._stopping:
                 return False
             scene, self._scene = self._scene, None
-            shots, self._shots = self._shots, {}
+            shot = self._shots.popleft() if self._shots else None
             self._busy = True
         if scene is not None:
             renderer.load(scene)
-        for topic, shot in shots.items():
-            picture = photograph(renderer, self._cameras[topic], shot, self._quality)
-            self._publish(topic, picture)
+        if shot is not None:
+            picture = photograph(renderer, self._cameras[shot.topic], shot, self._quality)
+            self._publish(shot.topic, picture)
         return True
+
+    def _drop_before(self, topic: str, stamp_ns: int) -> None:
+        late = [shot for shot in self._shots if shot.topic == topic and shot.stamp_ns < stamp_ns]
+        for shot in late:
+            self._shots.remove(shot)
+            if self._ready:
+                self.dropped[topic] += 1

@@ -6,11 +6,11 @@ the median of its turns.
 
 import argparse
 import json
+import os
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import psutil
@@ -19,6 +19,7 @@ from peers import PEER_HZ, PeerPhysics, egl_camera, tiny_camera
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
+from workers import Worker
 
 import worlds
 from cli import launch
@@ -36,11 +37,10 @@ from services.localizer.config import Config as LocalizerConfig
 from services.localizer.core import Localizer
 from services.operator.pilot import Person, Pilot
 from services.operator.route import route_of
-from services.sim.cameras import Camera, Shot, cameras_of
-from services.sim.config import Config
+from services.sim.cameras import SIZES, Shot, cameras_of
+from services.sim.config import Config, FrontSize
 from services.sim.core import PHYSICS_HZ, STEP_S, Simulation
-from services.sim.optics import Renderer
-from services.sim.stage import Stage
+from services.sim.stage import Scene, Stage
 from services.sim.studio import open_renderer, photograph
 from services.synthesis.config import Config as SynthesisConfig
 from services.synthesis.core import Synthesizer
@@ -51,6 +51,9 @@ LAPS = 40
 """Places along the track from which cameras are compared."""
 COMMAND = m.Command(stamp=0, seq=0, vx=0.1, vy=0.0, vz=0.0, wz=0.0, action="fly", mode="manual")
 SOAK_DRIFT_MS = 5.0
+PEER_CAMERAS = {"EGL plugin": 8, "TinyRenderer": 20}
+"""How many times slower they are to be."""
+FEW = 4
 
 
 @dataclass(frozen=True)
@@ -59,62 +62,73 @@ class Contender:
 
     Attributes:
         name: for people.
-        work: one turn of it.
+        worker: does its turns.
         units: what a turn gets done, in s of simulated time or in pictures.
     """
 
     name: str
-    work: Callable[[], None]
+    worker: Worker
     units: float
 
 
 def in_turns(contenders: list[Contender], turns: int, progress: Progress) -> dict[str, float]:
-    """Units a second of each, the median of its turns."""
-    clock = SystemClock()
+    """Units a second of each, the median of its turns; ends the workers."""
     task = progress.add_task(", ".join(each.name for each in contenders)[:60], total=turns)
     rates: dict[str, list[float]] = {each.name: [] for each in contenders}
     for _ in range(turns):
         for each in contenders:
-            begin_ns = clock.monotonic_ns()
-            each.work()
-            rates[each.name].append(each.units / seconds(clock.monotonic_ns() - begin_ns))
+            rates[each.name].append(each.units / each.worker.turn_s())
         progress.advance(task)
+    for each in contenders:
+        each.worker.close()
     return {name: float(np.median(values)) for name, values in rates.items()}
+
+
+def simulated(world: str, plant: str, duration_s: float) -> Callable[[], None]:
+    """A turn of physics and sensors without pictures."""
+    config = Config(world=world, plant=plant, renderer="none")  # type: ignore[arg-type]
+    simulation = Simulation(config)
+
+    def turn() -> None:
+        simulation.reset(m.ResetRequest(position=(0.0, 0.0, 1.0)))
+        for count in range(round(duration_s * PHYSICS_HZ)):
+            simulation.step(COMMAND if count % 4 == 0 else None)
+
+    return turn
+
+
+def peer_simulated(drag: bool, duration_s: float) -> Callable[[], None]:
+    """A turn of gym-pybullet-drones' physics."""
+    peer = PeerPhysics(drag)
+
+    def turn() -> None:
+        for _ in range(round(duration_s * PEER_HZ)):
+            peer.step()
+
+    return turn
 
 
 def physics(progress: Progress) -> list[Row]:
     """Physics and sensors without pictures, in process, beside gym-pybullet-drones' loop."""
-    contenders: list[Contender] = []
     duration_s = 10.0
-    for world in ("empty", "track"):
-        for plant in ("tum", "ardrone"):
-            config = Config(world=world, plant=plant, renderer="none")  # type: ignore[arg-type]
-            simulation = Simulation(config)
-
-            def ours(simulation: Simulation = simulation) -> None:
-                simulation.reset(m.ResetRequest(position=(0.0, 0.0, 1.0)))
-                for count in range(round(duration_s * PHYSICS_HZ)):
-                    simulation.step(COMMAND if count % 4 == 0 else None)
-
-            contenders.append(Contender(f"{plant} in {world}", ours, duration_s))
-    for name, drag in (("peer", False), ("peer with drag", True)):
-        peer = PeerPhysics(drag)
-
-        def theirs(peer: PeerPhysics = peer) -> None:
-            for _ in range(round(duration_s * PEER_HZ)):
-                peer.step()
-
-        contenders.append(Contender(name, theirs, duration_s))
-    rates = in_turns(contenders, TURNS, progress)
+    ours = [
+        Contender(f"{plant} in {world}", Worker(simulated, world, plant, duration_s), duration_s)
+        for world in ("empty", "track")
+        for plant in ("tum", "ardrone")
+    ]
+    theirs = [
+        Contender(name, Worker(peer_simulated, drag, duration_s), duration_s)
+        for name, drag in (("peer", False), ("peer with drag", True))
+    ]
+    rates = in_turns(ours + theirs, TURNS, progress)
     rows = [
         Row(f"physics and sensors, {each.name} (x real time)", rates[each.name], 200.0, ">= 200")
-        for each in contenders
-        if not each.name.startswith("peer")
+        for each in ours
     ]
-    for name in ("peer", "peer with drag"):
-        ours_s = rates["ardrone in empty"]
-        text = f"over gym-pybullet-drones' loop{name.removeprefix('peer')}, x {rates[name]:.0f}"
-        rows.append(Row(text, ours_s, rates[name], "ratio >= 1"))
+    for each in theirs:
+        rate = rates[each.name]
+        text = f"over gym-pybullet-drones' loop{each.name.removeprefix('peer')}, x {rate:.0f}"
+        rows.append(Row(text, rates["ardrone in empty"], rate, "ratio >= 1"))
     return rows
 
 
@@ -149,6 +163,7 @@ def chain(duration_s: float, progress: Progress) -> list[Row]:
 
 def localized(duration_s: float, progress: Progress) -> list[Row]:
     """Lock-step with both cameras' pictures, 640x360 and QVGA, and the localizer."""
+    with_all_cores()
     config = Config(world="track")
     simulation = Simulation(config)
     darkroom = Darkroom(simulation, config)
@@ -184,8 +199,8 @@ def localized(duration_s: float, progress: Progress) -> list[Row]:
     return [Row(figure, factor, 5.0, ">= 5")]
 
 
-def cameras(progress: Progress) -> list[Row]:
-    """Pictures of the track a second: ours encoded and published, pybullet's as they come."""
+def track_shots() -> tuple[Scene, list[Shot]]:
+    """The track, and what one sees along it."""
     world = worlds.load("track")
     stage = Stage(world, STEP_S)
     scene = stage.scene()
@@ -197,55 +212,73 @@ def cameras(progress: Progress) -> list[Row]:
         half = np.arctan2(dy, dx) / 2.0
         turn = (0.0, 0.0, float(np.sin(half)), float(np.cos(half)))
         shots.append(Shot("camera/front", 0, (float(x), float(y), float(z)), turn))
-    rows: list[Row] = []
+    return scene, shots
+
+
+def with_all_cores() -> None:
+    """Let Mesa rasterise on every core: no other service needs one here."""
+    os.environ["LP_NUM_THREADS"] = str(psutil.cpu_count() or 1)
+
+
+def photographed(size: FrontSize, endpoint: str) -> Callable[[], None]:
+    """A turn of our pictures, encoded and published through a router."""
+    with_all_cores()
+    scene, shots = track_shots()
+    camera = cameras_of(Config(front_size=size))[0]
     renderer = open_renderer("auto")
     renderer.load(scene)
-    peers: dict[str, Callable[[Camera, Shot], Any]] = {"TinyRenderer": tiny_camera(scene)}
-    try:
-        peers["EGL plugin"] = egl_camera(scene)
-    except OSError as error:
-        Console(stderr=True).print(f"without pybullet's EGL plugin: {error}")
-    with launch.running((), {}) as system:
-        node = Node(ZenohBus(system.endpoint), system.vehicle, "sim")
-        node.publishes("camera/front")
-        for size in ("360p", "720p"):
-            camera = cameras_of(Config(front_size=size))[0]  # type: ignore[arg-type]
-            rows += _compare(camera, shots, renderer, peers, node, progress)
-        node.close()
-    renderer.close()
-    return rows
+    node = Node(ZenohBus(endpoint), "bench", "sim")
+    node.publishes("camera/front")
 
-
-def _compare(
-    camera: Camera,
-    shots: list[Shot],
-    renderer: Renderer,
-    peers: dict[str, Callable[[Camera, Shot], Any]],
-    node: Node,
-    progress: Progress,
-) -> list[Row]:
-    size = f"{camera.lens.width}x{camera.lens.height}"
-
-    def ours() -> None:
+    def turn() -> None:
         for shot in shots:
             node.publish("camera/front", photograph(renderer, camera, shot, 80))
 
-    contenders = [Contender(f"{renderer.name}, {size}", ours, len(shots))]
-    for name, draw in peers.items():
+    return turn
 
-        def theirs(draw: Callable[[Camera, Shot], Any] = draw) -> None:
-            # A few are enough of what is slow.
-            for shot in shots[:: len(shots) // 4]:
-                draw(camera, shot)
 
-        contenders.append(Contender(name, theirs, len(shots[:: len(shots) // 4])))
-    rates = in_turns(contenders, 5, progress)
-    mine = rates[contenders[0].name]
-    rows = [Row(f"{size}, encoded and published (fps)", mine, 30.0)]
-    for name, bar in (("EGL plugin", 8), ("TinyRenderer", 20)):
-        if name in rates:
-            figure = f"{size} over pybullet's {name}, {rates[name]:.1f} fps raw"
-            rows.append(Row(figure, mine, rates[name], f"ratio >= {bar}"))
+def peer_photographed(size: FrontSize, name: str) -> Callable[[], None]:
+    """A turn of pybullet's own pictures, as they come; a few are enough of what is slow."""
+    scene, shots = track_shots()
+    camera = cameras_of(Config(front_size=size))[0]
+    draw = {"EGL plugin": egl_camera, "TinyRenderer": tiny_camera}[name](scene)
+
+    def turn() -> None:
+        for shot in shots[:: len(shots) // FEW]:
+            draw(camera, shot)
+
+    return turn
+
+
+def cameras(progress: Progress) -> list[Row]:
+    """Pictures of the track a second: ours encoded and published, pybullet's as they come."""
+    rows: list[Row] = []
+    with launch.running((), {}) as system:
+        count = len(track_shots()[1])
+        sizes: tuple[FrontSize, ...] = ("360p", "720p")
+        for size in sizes:
+            contenders = [Contender("ours", Worker(photographed, size, system.endpoint), count)]
+            for name in PEER_CAMERAS:
+                try:
+                    worker = Worker(peer_photographed, size, name)
+                except RuntimeError as error:
+                    Console(stderr=True).print(f"without pybullet's {name}: {error}")
+                    continue
+                few = len(range(0, count, count // FEW))
+                contenders.append(Contender(name, worker, few))
+            rates = in_turns(contenders, 5, progress)
+            pixels = "x".join(str(each) for each in SIZES[size])
+            rows.append(Row(f"{pixels}, encoded and published (fps)", rates["ours"], 30.0))
+            rows += [
+                Row(
+                    f"{pixels} over pybullet's {name}, {rates[name]:.1f} fps raw",
+                    rates["ours"],
+                    rates[name],
+                    f"ratio >= {bar}",
+                )
+                for name, bar in PEER_CAMERAS.items()
+                if name in rates
+            ]
     return rows
 
 

@@ -37,8 +37,15 @@ class SlowRenderer:
         pass
 
 
+FRONT_NS, DOWN_NS = 33_333_333, 16_666_667
+
+
 def front_at(stamp_ns: int) -> tuple[Shot, ...]:
     return (Shot("camera/front", stamp_ns, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0)),)
+
+
+def down_at(stamp_ns: int) -> tuple[Shot, ...]:
+    return (Shot("camera/down", stamp_ns, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0)),)
 
 
 def test_a_slow_renderer_drops_pictures_and_holds_up_nobody(
@@ -55,18 +62,36 @@ def test_a_slow_renderer_drops_pictures_and_holds_up_nobody(
             arrived.set()
 
     cameras = studio.Studio("gl", CAMERAS, 80, publish)
-    cameras.take(front_at(1))
+    cameras.take(front_at(FRONT_NS))
     assert renderer.drawing.wait(5.0)
-    for stamp_ns in range(2, 10):
-        cameras.take(front_at(stamp_ns))
+    for count in range(2, 10):
+        cameras.take(front_at(count * FRONT_NS))
     renderer.go_on.release(2)
     assert arrived.wait(5.0)
     cameras.close()
-    assert [message.stamp for message in taken] == [1, 9]
+    assert [message.stamp for message in taken] == [FRONT_NS, 9 * FRONT_NS]
     assert cameras.dropped["camera/front"] == 7
     first = taken[0]
     assert isinstance(first, Image)
-    assert (first.width, first.height, first.capture) == (640, 360, 1)
+    assert (first.width, first.height, first.capture) == (640, 360, FRONT_NS)
+
+
+def test_two_shots_from_below_may_come_while_a_front_picture_is_drawn(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    renderer = SlowRenderer()
+    monkeypatch.setattr(studio, "open_renderer", lambda _choice: renderer)
+    taken: list[Message] = []
+    cameras = studio.Studio("gl", CAMERAS, 80, lambda _topic, message: taken.append(message))
+    cameras.take(front_at(0))
+    assert renderer.drawing.wait(5.0)
+    for count in range(1, 5):
+        cameras.take(down_at(count * DOWN_NS))
+    renderer.go_on.release(3)
+    cameras.finish()
+    cameras.close()
+    assert [message.stamp for message in taken] == [0, 3 * DOWN_NS, 4 * DOWN_NS]
+    assert cameras.dropped["camera/down"] == 2
 
 
 def test_without_opengl_pybullet_draws_unless_opengl_was_asked_for(
