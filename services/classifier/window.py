@@ -1,7 +1,7 @@
 """The sliding window of sticks: back to the start of the motion, at the model's rate.
 
 Each stick is brought to the model's rate as it comes, so that asking for the window costs nothing:
-at 100 Hz and T = 0.1 s that is 10 rows an intent instead of 200.
+at T = 0.1 s that is 5 rows an intent instead of 400.
 """
 
 import math
