@@ -251,7 +251,10 @@ class ClassifyRequest(Payload, frozen=True, kw_only=True):
 
 
 class FitRequest(Payload, frozen=True, kw_only=True):
-    """Points, oldest first, through which a primitive is to be fitted."""
+    """Points, oldest first, through which a primitive is to be fitted.
+
+    A `speed` beyond the service's limits is brought into them, and the answer's `note` says so.
+    """
 
     primitive: Name
     points: Annotated[list[Vector3], Meta(min_length=2, max_length=100_000)]
