@@ -1,12 +1,13 @@
 """The chain in one process: cores stepped together on the simulator's time, as fast as they go.
 
-No network, no clock, no threads: what one core says, the others hear within the same step of
+No network, no clock, no threads but the one that draws: what one core says, the others hear within the same step of
 physics, and the same seeds give the same flight. Messages all have `seq` 0 but sticks, which are
 numbered.
 """
 
 from collections import defaultdict, deque
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Protocol
 
 from common import messages as m
@@ -45,7 +46,7 @@ class Operator(Protocol):
 
 
 class Darkroom:
-    """Draws what the simulator's cameras take, at once.
+    """Draws what the simulator's cameras take, on a thread of its own while the flight goes on.
 
     Args:
         simulation: in whose present world pictures are taken; after a change of the world, `load`.
@@ -59,20 +60,24 @@ class Darkroom:
         self._simulation = simulation
         self._quality = config.jpeg_quality
         self._cameras = {camera.topic: camera for camera in cameras_of(config)}
-        self._renderer = open_renderer(config.renderer)
+        # OpenGL belongs to the thread that opened it.
+        self._thread = ThreadPoolExecutor(1, "darkroom")
+        self._renderer = self._thread.submit(open_renderer, config.renderer).result()
         self.load()
 
     def load(self) -> None:
         """Take pictures of the simulator's present world from now on."""
-        self._renderer.load(self._simulation.scene())
+        self._thread.submit(self._renderer.load, self._simulation.scene()).result()
 
-    def develop(self, shot: Shot) -> m.Image:
-        """The picture of a shot."""
-        return photograph(self._renderer, self._cameras[shot.topic], shot, self._quality)
+    def develop(self, shot: Shot) -> Future[m.Image]:
+        """The picture of a shot, when it is done."""
+        camera = self._cameras[shot.topic]
+        return self._thread.submit(photograph, self._renderer, camera, shot, self._quality)
 
     def close(self) -> None:
         """Free the renderer."""
-        self._renderer.close()
+        self._thread.submit(self._renderer.close).result()
+        self._thread.shutdown()
 
 
 class Lockstep:
@@ -109,7 +114,7 @@ class Lockstep:
         self._darkroom = darkroom
         self._listeners: dict[str, list[Listener]] = defaultdict(list)
         self._commands: deque[m.Command] = deque()
-        self._pictures: deque[tuple[int, str, m.Image]] = deque()
+        self._pictures: deque[tuple[int, str, Future[m.Image]]] = deque()
         self._count = 0
         self._nonce = 0
         self._control_every = PHYSICS_HZ // CONTROL_HZ
@@ -195,7 +200,7 @@ class Lockstep:
                     self._pictures.append((due_ns, shot.topic, picture))
             while self._pictures and self._pictures[0][0] <= self.now_ns:
                 _, topic, picture = self._pictures.popleft()
-                self.say(topic, picture)
+                self.say(topic, picture.result())
         if self._count % self._control_every == 0:
             self._control()
         if self._classifier is not None and self._count % self._intent_every == 0:
