@@ -61,6 +61,12 @@ def declare(parser: argparse.ArgumentParser) -> None:
         default=Path("models/intent.onnx"),
         help="the model that --finetune begins with (models/intent.onnx)",
     )
+    parser.add_argument(
+        "--ablation",
+        metavar="FILE",
+        type=Path,
+        help="instead, compare variants of the network (about 20 minutes) and write the page FILE",
+    )
     parser.set_defaults(action=_run)
 
 
@@ -111,6 +117,8 @@ def _run(options: argparse.Namespace) -> int:
         bars = _Bars(progress)
         if options.finetune is not None:
             return _finetune(console, options, bars)
+        if options.ablation is not None:
+            return _ablation(console, options, bars)
         run = train(
             options.preset,
             options.seed,
@@ -136,6 +144,18 @@ def _finetune(console: Console, options: argparse.Namespace, bars: _Bars) -> int
         f" {done.after:.3f} after, on those left out of each of three adaptations"
     )
     console.print(f"{done.path}  sha256 {done.sha256[:8]}")
+    return 0
+
+
+def _ablation(console: Console, options: argparse.Namespace, bars: _Bars) -> int:
+    from training.ablation import ablate, page_of, sets_of, table_of
+
+    sets = sets_of(bars.generating)
+    rows = []
+    for row in ablate(sets, bars.generating):
+        rows.append(row)
+        console.print(table_of(rows[-1:]).splitlines()[-1], soft_wrap=True)
+        options.ablation.write_text(page_of(rows, {k: len(v) for k, v in sets.items()}))
     return 0
 
 

@@ -35,7 +35,7 @@ OWN_BATCH, REPLAY_BATCH = 32, 64
 LEARNING_RATE = 1e-3
 OWN_WEIGHT = 0.5
 """Of the person's own loss, beside that of keeping to the old answers for others."""
-PULL = 20.0
+PULL = 0.02
 """Towards the old weights: of the squared distance of all of them together."""
 LEARNING = ("head.", "reader.", "encoder.gru.")
 """Layers that adapt; what the sticks draw is the same for everybody."""
@@ -58,11 +58,13 @@ def adapt(fitted: Fitted, own: Examples, replay: Examples, seed: int) -> Fitted:
     """
     torch.set_num_threads(THREADS)
     rng = np.random.default_rng(seed)
-    network = copy.deepcopy(fitted.network).eval()
+    network = copy.deepcopy(fitted.network).eval().requires_grad_(False)
     others = [random_windows(replay, rng, augment=False) for _ in range(CUTS)]
     answers = [said(fitted.network, windows) for windows in others]
     moving = {
-        name: weights for name, weights in network.named_parameters() if name.startswith(LEARNING)
+        name: weights.requires_grad_()
+        for name, weights in network.named_parameters()
+        if name.startswith(LEARNING)
     }
     before = {name: weights.detach().clone() for name, weights in moving.items()}
     optimiser = torch.optim.Adam(moving.values(), lr=LEARNING_RATE)
@@ -79,7 +81,7 @@ def adapt(fitted: Fitted, own: Examples, replay: Examples, seed: int) -> Fitted:
         logits, meant = network(*inputs_of(_rows(others[kept], index), FULL_YAW_RADPS))
         old_logits, old_meant = answers[kept]
         loss = loss + _departure(logits, meant, old_logits[index], old_meant[index])
-        loss = loss + PULL / 1000.0 * sum(
+        loss = loss + PULL * sum(
             ((weights - before[name]) ** 2).sum() for name, weights in moving.items()
         )
         loss.backward()  # type: ignore[no-untyped-call]

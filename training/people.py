@@ -76,7 +76,12 @@ def _parts(
 
 
 def people_of(
-    name: str, share: Share, seed: int, processes: int = 1, tell: Tell = lambda *_: None
+    name: str,
+    share: Share,
+    seed: int,
+    processes: int = 1,
+    tell: Tell = lambda *_: None,
+    wide: Population = WIDE,
 ) -> list[Primitive]:
     """A set of people that no set of another name and seed shares.
 
@@ -86,9 +91,10 @@ def people_of(
         seed: the same seed gives the same set, in any number of processes.
         processes: that make it side by side.
         tell: told the name, how many of how many parts are done.
+        wide: the wide population, or some of its families.
     """
     seeds = np.random.SeedSequence(seed).generate_state(2)
-    parts = _parts(name, WIDE, share.wide_people, share.wide, share.none, int(seeds[0]))
+    parts = _parts(name, wide, share.wide_people, share.wide, share.none, int(seeds[0]))
     parts += _parts(name, THESIS, share.thesis_people, share.thesis, share.none, int(seeds[1]))
     primitives: list[Primitive] = []
     if processes == 1:

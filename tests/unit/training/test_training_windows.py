@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from services.classifier.model import SHORTEST_SAMPLES
+from services.classifier.window import WINDOW_SAMPLES
 from training.generator.dataset import generate
 from training.labels import NONE, PRIMITIVES
 from training.windows import (
@@ -28,10 +29,10 @@ def test_early_windows_end_where_asked(examples: Examples) -> None:
         assert not row[length:].any()
 
 
-def test_the_window_at_the_end_is_the_newest_four_seconds(examples: Examples) -> None:
+def test_the_window_at_the_end_is_the_newest_seconds(examples: Examples) -> None:
     windows = seen_after(examples, None)
     for row, length, track in zip(windows.sticks, windows.lengths, examples.tracks, strict=True):
-        assert length == min(200, len(track))
+        assert length == min(WINDOW_SAMPLES, len(track))
         assert np.array_equal(row[:length], track[-length:])
 
 
@@ -40,7 +41,7 @@ def test_random_windows_are_seeded_and_long_enough(examples: Examples) -> None:
     other = random_windows(examples, np.random.default_rng(4))
     assert np.array_equal(one.sticks, other.sticks)
     assert one.lengths.min() >= SHORTEST_SAMPLES
-    assert one.lengths.max() <= 200
+    assert one.lengths.max() <= WINDOW_SAMPLES
     assert len(set(one.lengths.tolist())) > 20
 
 
@@ -71,7 +72,7 @@ def test_one_primitive_is_flown_into_the_next_without_a_turn() -> None:
     for seed in range(10):
         window = spliced(line, arc, np.random.default_rng(seed))
         assert window is not None
-        assert len(window) <= 200
+        assert len(window) <= WINDOW_SAMPLES
         assert np.hypot(window[:, 0], window[:, 1]) == pytest.approx(0.8, rel=0.01)
         heading = np.unwrap(np.arctan2(window[:, 1], window[:, 0]))
         assert np.abs(np.diff(heading)).max() < 0.1
