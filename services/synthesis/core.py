@@ -228,7 +228,8 @@ class Synthesizer:
                     pass
                 else:
                     if same(shape, running.shape):
-                        return Offer(shape, intent.probabilities[name]), path
+                        note = f"still {name}: {intent.label} was said only once"
+                        return Offer(shape, intent.probabilities[name], note), path
         label: str | None = intent.label
         confidence = intent.confidence
         reasons: list[str] = []
