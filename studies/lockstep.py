@@ -1,8 +1,8 @@
 """The chain in one process: cores stepped together on the simulator's time, as fast as they go.
 
-No network, no clock, no threads but the one that draws: what one core says, the others hear within the same step of
-physics, and the same seeds give the same flight. Messages all have `seq` 0 but sticks, which are
-numbered.
+No network, no clock, no threads but the one that draws: what one core says, the others hear within
+the same step of physics, and the same seeds give the same flight. Messages all have `seq` 0 but
+sticks, which are numbered.
 """
 
 from collections import defaultdict, deque

@@ -5,6 +5,7 @@ Each is a square of PIXELS x PIXELS RGBA that repeats without a seam, unless it 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -37,6 +38,7 @@ class Paint:
     height_m: float | None
 
 
+@cache
 def paint(texture: Texture) -> Paint:
     """The paint of a texture; the same one each time."""
     painter, width_m, height_m = _PAINTERS[texture]

@@ -61,9 +61,9 @@ def test_a_seed_is_a_flight_to_the_bit() -> None:
 
 
 def test_no_picture_is_dropped() -> None:
-    first, second = (flown(5, "auto", 0.5) for _ in range(2))
+    first, second = (flown(5, "auto", 0.2) for _ in range(2))
     assert first == second
-    assert (len(first["camera/front"]), len(first["camera/down"])) == (15, 30)
+    assert (len(first["camera/front"]), len(first["camera/down"])) == (6, 12)
 
 
 def test_a_reset_is_granted_while_it_waits() -> None:

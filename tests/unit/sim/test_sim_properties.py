@@ -63,7 +63,7 @@ def test_no_stick_takes_it_beyond_the_limits_of_the_plant(plant: str, plan: list
 
 @plants
 def test_hands_off_it_wanders_as_far_as_its_noise_carries_it(plant: str) -> None:
-    flights, duration_s, step_s = 12, 15.0, 0.02
+    flights, duration_s, step_s = 8, 15.0, 0.02
     simulation = hovering(plant=plant, height_m=5.0, command_noise=1.0)
     ends_m = []
     for seed in range(flights):
