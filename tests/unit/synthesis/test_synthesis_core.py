@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthesis_truth import S, arc_points, intent, noisy, pose, poses, sine_points
 
-from common.messages import FitRequest, Refusal, Suggestion
+from common.messages import FitRequest, Refusal, Suggestion, VehicleStatus
 from services.synthesis.config import Config
 from services.synthesis.core import RefusalError, Synthesizer
 
@@ -121,6 +121,32 @@ def test_speed_is_the_recent_mean_within_limits(speed, expected):
 def test_the_sector_is_that_of_travel_against_the_body():
     synthesizer, now_ns = flown(lambda t: np.array([0.0, SPEED * t, 1.0]), 3.0, yaw=math.pi)
     assert synthesizer.on_intent(intent("line", 3.0), now_ns).heading_sector == 6
+
+
+def test_the_same_flight_gives_the_same_suggestions_again():
+    said = []
+    for _ in range(2):
+        synthesizer, now_ns = flown(wobbling(lambda t: along_circle(SPEED * t)), 4.0)
+        said.append(
+            [synthesizer.on_intent(intent(label, 3.0), now_ns) for label in ("arc", "sine")]
+        )
+    assert said[0] == said[1]
+
+
+@pytest.mark.parametrize(("world", "known"), [("track", True), ("nowhere", False)])
+def test_walls_are_those_of_the_world_that_the_vehicle_is_in(world, known):
+    synthesizer, now_ns = flown(lambda t: np.array([SPEED * t, SPEED * t, 1.0]) / 2.0, 3.0)
+    status = VehicleStatus(
+        stamp=0, seq=0, state="flying", battery=1.0, world=world, plant="tum", collisions=0
+    )
+    synthesizer.on_vehicle(status)
+    said = synthesizer.on_intent(intent("line", 3.0), now_ns)
+    assert (synthesizer.world_trouble is None) == known
+    text = said.reason if isinstance(said, Refusal) else said.note or ""
+    assert ("ahead" in text) == known
+    synthesizer.on_vehicle(msgspec.structs.replace(status, world="empty"))
+    assert synthesizer.world_trouble is None
+    assert len(synthesizer.on_intent(intent("line", 3.0), now_ns).path) == 201
 
 
 def refusal(synthesizer, message, now_ns):
