@@ -5,15 +5,12 @@ import copy
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from sklearn.pipeline import Pipeline, make_pipeline
-from sklearn.preprocessing import StandardScaler
-from sklearn.svm import SVC
 from torch import Tensor, nn
 
 from training.evaluation.contender import Lesson, Scores, Tell
 from training.evaluation.views import in_start_frame, padded, thinned
 from training.labels import PRIMITIVES
-from training.svm import GAMMA, POINTS, C
+from training.svm import POINTS, machine
 from training.windows import Windows
 
 Array32 = NDArray[np.float32]
@@ -38,11 +35,6 @@ def machine_rows(windows: Windows, full_yaw_radps: float) -> NDArray[np.float64]
         at, index = np.linspace(0.0, length - 1.0, POINTS), np.arange(length)
         rows.append(np.concatenate([np.interp(at, index, one[:length, axis]) for axis in (1, 0)]))
     return np.stack(rows)
-
-
-def machine() -> Pipeline:
-    """The RBF machine, one against one; gamma 0.001 means something on standardised rows only."""
-    return make_pipeline(StandardScaler(), SVC(C=C, gamma=GAMMA, kernel="rbf"))
 
 
 class ThesisMachine:

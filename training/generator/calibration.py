@@ -13,13 +13,10 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 from sklearn.metrics import f1_score
 from sklearn.model_selection import train_test_split
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
-from sklearn.svm import SVC
 
 from training.dataset.primitive import Primitive
 from training.generator.dataset import THESIS, populate
-from training.svm import GAMMA, POINTS, C
+from training.svm import POINTS, machine
 
 COUNTS = {"line": 217, "arc": 315, "sine": 262}
 OPERATORS = 20
@@ -57,8 +54,7 @@ def machine_f1(difficulty: float, seed: int) -> float:
     learn_x, test_x, learn_y, test_y = train_test_split(
         x, y, test_size=TEST_SHARE, random_state=seed
     )
-    machine = make_pipeline(StandardScaler(), SVC(C=C, gamma=GAMMA, kernel="rbf"))
-    said = machine.fit(learn_x, learn_y).predict(test_x)
+    said = machine().fit(learn_x, learn_y).predict(test_x)
     return float(f1_score(test_y, said, average="weighted"))
 
 

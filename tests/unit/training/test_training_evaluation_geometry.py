@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from training.dataset.primitive import Primitive
 from training.evaluation.distortions import DISTORTIONS, distorted
 from training.evaluation.geometry import NAMES, features
+from training.evaluation.thesis import machine_rows
 from training.evaluation.views import in_start_frame, padded
+from training.svm import machine
 from training.windows import Windows
 
 AT = {name: place for place, name in enumerate(NAMES)}
@@ -118,3 +120,12 @@ def test_distortions_have_their_size() -> None:
     kept = sum(len(one) for one in of["10 % lost"]) / (20 * 300)
     assert kept == pytest.approx(0.9, abs=0.01)
     assert np.abs(of["half-size sticks"][0].sticks).max() == pytest.approx(0.5, abs=1e-3)
+
+
+def test_the_svm_sees_100_roll_and_100_pitch_samples() -> None:
+    sticks = np.random.default_rng(0).uniform(-1.0, 1.0, (150, 4))
+    sticks[:, 3] = 0.0
+    (row,) = machine_rows(windows(sticks, 130), 1.0)
+    assert row.shape == (200,)
+    assert row[[0, 99, 100, 199]] == pytest.approx(sticks[[0, 129, 0, 129], [1, 1, 0, 0]])
+    assert machine().named_steps["svc"].gamma == 0.001

@@ -2,11 +2,7 @@ import numpy as np
 import pytest
 from sklearn.metrics import f1_score
 
-from training.generator.dataset import generate
-from training.labels import PRIMITIVES
 from training.scores import calibration_error, score, weighted_f1
-from training.svm import features, fit_svm
-from training.windows import examples_of, seen_after
 
 
 def test_f1_is_that_of_a_library_not_eq_5_1() -> None:
@@ -36,16 +32,3 @@ def test_calibration_error_is_the_gap_between_confidence_and_accuracy() -> None:
     truth = np.repeat([0, 1], 50)
     assert calibration_error(probabilities, truth) == pytest.approx(0.3)
     assert calibration_error(probabilities, np.repeat([0, 1], [80, 20])) == pytest.approx(0.0)
-
-
-def test_the_svm_sees_100_roll_and_100_pitch_samples() -> None:
-    examples = examples_of(generate(10, dict.fromkeys(PRIMITIVES, 25), seed=1))
-    windows = seen_after(examples, None)
-    rows = features(windows)
-    assert rows.shape == (100, 200)
-    length = windows.lengths[0]
-    assert rows[0, 0] == pytest.approx(windows.sticks[0, 0, 1])
-    assert rows[0, 199] == pytest.approx(windows.sticks[0, length - 1, 0])
-    machine = fit_svm(windows)
-    assert machine.named_steps["svc"].gamma == 0.001
-    assert (machine.predict(rows) == windows.labels).mean() > 0.6
