@@ -65,7 +65,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--ablation",
         metavar="FILE",
         type=Path,
-        help="instead, compare variants of the network (about 20 minutes) and write the page FILE",
+        help="instead, compare variants of the network (about 10 minutes) and write the page FILE",
     )
     parser.set_defaults(action=_run)
 

@@ -20,11 +20,11 @@ from training.windows import Examples, examples_of, seen_after
 LEFT_OUT = ("novice", "pilot-both")
 SEEDS = (0, 1)
 PEOPLE_SEED = 30_000
-BUDGET = Budget(windows=120_000)
-TRAINING = Share(wide_people=160, wide=2.5, thesis_people=60, thesis=1.0)
-VALIDATION = Share(wide_people=50, wide=0.3, thesis_people=25, thesis=0.15)
-TEST = Share(wide_people=75, wide=0.6, thesis_people=50, thesis=0.5, none=0.0)
-STRANGERS = Share(wide_people=50, wide=0.5, thesis_people=0, thesis=0.0, none=0.0)
+BUDGET = Budget(windows=40_000)
+TRAINING = Share(wide_people=120, wide=1.2, thesis_people=40, thesis=0.5)
+VALIDATION = Share(wide_people=40, wide=0.2, thesis_people=20, thesis=0.1)
+TEST = Share(wide_people=60, wide=0.4, thesis_people=40, thesis=0.4, none=0.0)
+STRANGERS = Share(wide_people=40, wide=0.4, thesis_people=0, thesis=0.0, none=0.0)
 MOMENTS_S = (1.0, 2.0, None)
 COLUMNS: tuple[tuple[str, str, float | None], ...] = (
     ("calibrated, end", "calibrated", None),

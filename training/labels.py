@@ -1,9 +1,10 @@
 """What a person's sticks can mean: the four primitives, or none of them."""
 
-from common.messages import NONE_LABEL
+from common.messages import NONE_LABEL as NONE
+from common.messages import PRIMITIVES
 
-PRIMITIVES = ("line", "arc", "sine", "helix")
-"""In the order of a model's probabilities."""
-NONE = NONE_LABEL
-"""Rest, turning on the spot, hover corrections, free flight."""
+__all__ = ["CLASSES", "NONE", "PRIMITIVES"]
+
 CLASSES = (*PRIMITIVES, NONE)
+"""Primitives are in the order of a model's probabilities; none is rest, turning on the spot, hover
+corrections, free flight."""
