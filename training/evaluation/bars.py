@@ -228,7 +228,9 @@ def _robust(results: Results) -> list[Bar]:
 
 def _adapted(results: Results) -> list[Bar]:
     """What five performances a primitive do for the person they are of, and cost the others."""
-    people = [one for found in results.judged[OURS].values() for one in found["adapted"]]
+    people = [one for found in results.judged[OURS].values() for one in found.get("adapted", [])]
+    if not people:
+        return []
     gained, lost = (
         estimate(100.0 * sign * (one[f"{who}_after"] - one[f"{who}_before"]) for one in people)
         for who, sign in (("own", 1.0), ("others", -1.0))

@@ -26,6 +26,8 @@ PERIODS_S = (1.0, 0.1)
 
 ADAPTED = 4
 """So many people a seed show five performances of each primitive of their own."""
+REPLAYED = 1500
+"""So many performances of others are kept in mind meanwhile."""
 DISTORTED = 240
 """So many performances are distorted in each way."""
 
@@ -99,14 +101,6 @@ def _of_ours(
             found = ours.meant(seen_after(examples_of(people), after)).tolist()
             meant.setdefault(kind, []).extend(found)
             meant[f"{kind} {moment}"] = found
-    adapted = adaptation_study(
-        ours.fitted,
-        examples_of(fold.lesson.training),
-        examples_of(fold.tests[KNOWN]),
-        seed,
-        people=ADAPTED,
-        candidates=3 * ADAPTED,
-    )
     ours.export(model_path)
     model = OnnxModel(model_path)
     hold_seed = int(np.random.SeedSequence((seed, 9)).generate_state(1)[0])
@@ -117,9 +111,23 @@ def _of_ours(
             moment: _auroc(meant[f"four{moment}"], meant[f"none{moment}"])
             for moment in ("", *(f" {name}" for name in MOMENTS))
         },
-        "adapted": [vars(person) for person in adapted],
         "hover": {str(period_s): vars(bothered(model, held, period_s)) for period_s in PERIODS_S},
     }
+
+
+def adapted(ours: Ours, fold: Fold, seed: int) -> list[dict[str, Any]]:
+    """What a few performances of their own do for unusual people, and for the others."""
+    order = np.random.default_rng(seed).permutation(len(fold.lesson.training))
+    replay = [fold.lesson.training[place] for place in order[:REPLAYED]]
+    study = adaptation_study(
+        ours.fitted,
+        examples_of(replay),
+        examples_of(fold.tests[KNOWN]),
+        seed,
+        people=ADAPTED,
+        candidates=3 * ADAPTED,
+    )
+    return [vars(person) for person in study]
 
 
 def _auroc(four: list[float], none: list[float]) -> dict[str, float]:

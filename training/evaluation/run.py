@@ -13,8 +13,9 @@ from training.evaluation.cache import Cache
 from training.evaluation.contenders import contender
 from training.evaluation.folds import SEEDS, SIZES, Fold, fingerprint, fold
 from training.evaluation.human import HUMAN_SETS, HumanSet, judge_human
-from training.evaluation.judging import judge
+from training.evaluation.judging import adapted, judge
 from training.evaluation.latency import latency
+from training.evaluation.ours import Ours
 from training.evaluation.report import write
 from training.evaluation.results import Results
 from training.evaluation.tables import Table
@@ -75,6 +76,10 @@ def _judged(
                     fresh, made, seed, size.hovering_people, clock, path, _seed(report, seed)
                 )
                 cache.keep(found, mark, name, seed)
+                if isinstance(fresh, Ours):
+                    report(f"seed {seed}, {name}: adapts", 0, 1)
+                    found["adapted"] = adapted(fresh, made, seed)
+                    cache.keep(found, mark, name, seed)
             if found is not None:
                 judged.setdefault(name, {})[seed] = found
     return judged, not_run
