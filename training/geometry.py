@@ -45,7 +45,6 @@ class Geometry(nn.Module):
     """Sticks as geometry that does not change when the whole motion is turned about z."""
 
     waves: Tensor
-    both: Tensor
     kernels: Tensor
     quarter: Tensor
     lag: Tensor
@@ -57,25 +56,23 @@ class Geometry(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        # Cosines over the way first, then over the time.
-        both = torch.eye(2).repeat_interleave(WAVES + 1, 0)
-        waves = math.pi * torch.arange(WAVES + 1.0).repeat(2)
-        self.register_buffer("both", both, persistent=False)
-        self.register_buffer("waves", both * waves[:, None], persistent=False)
+        waves = math.pi * torch.arange(WAVES + 1, dtype=torch.float32)
+        self.register_buffer("waves", waves[None, None, :, None], persistent=False)
         # A quarter turn to the left.
         quarter = torch.tensor([[0.0, -1.0], [1.0, 0.0]])
         self.register_buffer("quarter", quarter, persistent=False)
         longest = max(TURN_TAPS)
-        # Sums of turns in each plane over each of TURN_TAPS, then how many turns there are in each.
-        scales = len(TURN_TAPS)
-        kernels = torch.zeros((PLANES + 1) * scales, PLANES + 1, longest)
+        # Sums of turns in each plane over each of TURN_TAPS, and of how many of them there are.
+        count = PLANES * len(TURN_TAPS)
+        kernels = torch.zeros(2 * count, PLANES + 1, longest)
         for scale, taps in enumerate(TURN_TAPS):
             inside = slice((longest - taps) // 2, (longest + taps) // 2)
             for plane in range(PLANES):
-                kernels[PLANES * scale + plane, plane, inside] = 1.0
-            kernels[PLANES * scales + scale, PLANES, inside] = 1.0
+                row = PLANES * scale + plane
+                kernels[row, plane, inside] = 1.0
+                kernels[count + row, PLANES, inside] = 1.0
         decay = torch.exp(-STEP_S / LAG_S * torch.arange(LAG_TAPS - 1.0, -1.0, -1.0))
-        gains = torch.tensor([1.0, 1.0, UP_PER_AHEAD]) * (1.0 - math.exp(-STEP_S / LAG_S))
+        gains = torch.tensor([1.0, 1.0, 1.0, UP_PER_AHEAD]) * (1.0 - math.exp(-STEP_S / LAG_S))
         self.register_buffer("lag", torch.diag(gains)[:, :, None] * decay, persistent=False)
         self.register_buffer("kernels", kernels, persistent=False)
 
@@ -103,17 +100,15 @@ class Geometry(nn.Module):
         chord = flat.sum(2, keepdim=True)
         chord_length = _length(chord, 1e-6)
         axis = chord / chord_length
-        main = self._main_axis(flat, axis)
-        axes = torch.cat([axis, torch.matmul(self.quarter, axis), main], 2)
+        axes = torch.cat([axis, torch.matmul(self.quarter, axis), self._main_axis(flat, axis)], 2)
         turned = torch.matmul(axes.transpose(1, 2), flat)
         ahead = turned[:, 2:]
         local = torch.cat([turned, vz], 1)
 
         # Shapes lie in the horizontal plane, or in the vertical one that most of the motion is in.
         # Pilots shape what the vehicle flies, and their sticks lead it.
-        flown = F.conv1d(F.pad(v, (LAG_TAPS - 1, 0)), self.lag)
-        fx, fy, f_up = torch.split(flown, 1, 1)
-        f_ahead = torch.matmul(main.transpose(1, 2), flown[:, :2])
+        flown = F.conv1d(F.pad(torch.cat([flat, ahead, vz], 1), (LAG_TAPS - 1, 0)), self.lag)
+        fx, fy, f_ahead, f_up = torch.split(flown, 1, 1)
         planes = torch.cat([vx, fx, f_ahead, vy, fy, f_up], 1)
         squares = planes * planes
         speed = torch.sqrt(squares[:, :3] + squares[:, 3:] + 1e-8) * mask
@@ -123,9 +118,7 @@ class Geometry(nn.Module):
         heading = torch.cumsum(step, 2)
         heading = (heading - (heading * by_way).sum(2, keepdim=True)) * mask
         sums = F.conv1d(torch.cat([step, mask], 1), self.kernels, padding=max(TURN_TAPS) // 2)
-        fine, coarse, counts = torch.split(sums, [PLANES, PLANES, len(TURN_TAPS)], 1)
-        share = mask / (counts.clamp(min=1.0) * STEP_S)
-        turn = torch.cat([fine * share[:, :1], coarse * share[:, 1:]], 1)
+        turn = sums[:, :6] / sums[:, 6:].clamp(min=1.0) * mask / STEP_S
         flat_speed = speed[:, :1]
         raw, wz = torch.split(raw, [2, 1], 1)
         relative = torch.cat([local, flat_speed, raw], 1) / level
@@ -173,7 +166,7 @@ class Geometry(nn.Module):
             ],
             1,
         ).squeeze(2)
-        summary = self._summary(signals, torch.cat([by_way, by_time], 1), sizes)
+        summary = self._summary(signals, torch.stack([by_way, by_time], 1), sizes)
         return channels, mask, summary
 
     def _velocity(
@@ -194,9 +187,9 @@ class Geometry(nn.Module):
         stacked = torch.cat([straight, vz, flat, turning, real], 1)
         means = F.avg_pool1d(stacked, SMOOTH_TAPS, STRIDE, SMOOTH_TAPS // 2)
         mask = real[:, :, ::STRIDE]
-        sums, share = torch.split(means, [6, 1], 1)
-        v, raw = torch.split(sums * (mask / share.clamp(min=1.0 / SMOOTH_TAPS)), 3, 1)
-        return v, raw, mask
+        v, raw, share = torch.split(means, [3, 3, 1], 1)
+        scale = mask / share.clamp(min=1.0 / SMOOTH_TAPS)
+        return v * scale, raw * scale, mask
 
     @staticmethod
     def _main_axis(v: Tensor, guess: Tensor) -> Tensor:
@@ -231,11 +224,11 @@ class Geometry(nn.Module):
 
         Args:
             signals: (B, SIGNALS, T), the first `SIGNED` of them signed.
-            shares: (B, 2, T) of each step in the way and in the time; each sums to 1.
+            shares: (B, 2, 1, T) of each step in the way and in the time; each sums to 1.
             sizes: (B, n) positive, over `n` orders of magnitude; the third is seconds.
         """
-        middle = torch.cumsum(shares, 2) - 0.5 * shares
-        waves = torch.cos(torch.matmul(self.waves, middle)) * torch.matmul(self.both, shares)
+        middle = torch.cumsum(shares, 3) - 0.5 * shares
+        waves = (torch.cos(middle * self.waves) * shares).flatten(1, 2)
         coefficients = torch.matmul(waves, signals.transpose(1, 2))
         means = coefficients[:, WAVES + 1]
         # Turns to the left and to the right, at both scales and in each plane.
