@@ -70,7 +70,7 @@ class Synthesizer:
         self._config = config
         self._known = PRIMITIVES | (EXTENDED if config.primitives == "extended" else {})
         self._history = History()
-        self._surroundings = Surroundings(config)
+        self._surroundings = Surroundings(config, bodies=None)
         self._world: str | None = None
         self._running: Running | None = None
         self._last_id = 0
@@ -88,7 +88,7 @@ class Synthesizer:
         if vehicle.world == self._world:
             return
         self._world = vehicle.world
-        self._surroundings = Surroundings(self._config)
+        self._surroundings = Surroundings(self._config, bodies=None)
         self.world_trouble = None
         try:
             bodies = worlds.load(vehicle.world).bodies

@@ -28,7 +28,7 @@ class Way:
     Attributes:
         path: (M, 4), x y z in m and yaw in rad.
         closed: whether its end joins its start.
-        note: what it was shortened for; empty if it was not.
+        note: what it was shortened for, and what was not looked at; mostly empty.
     """
 
     path: Array
@@ -41,11 +41,13 @@ class Surroundings:
 
     Args:
         config: the limits and the vehicle's clearance.
-        bodies: what stands in the world; none are known to be in the way without them.
+        bodies: what stands in the world; None where that is not known, which paths' notes say.
     """
 
-    def __init__(self, config: Config, bodies: tuple[Body, ...] = ()) -> None:
+    def __init__(self, config: Config, bodies: tuple[Body, ...] | None) -> None:
         self._config = config
+        self._unknown = bodies is None
+        bodies = bodies or ()
         self._clearance_m = config.half_width_m + config.margin_m
         self._names = [body.texture for body in bodies]
         self._centres = np.array([body.position_m for body in bodies]).reshape(-1, 3)
@@ -76,9 +78,11 @@ class Surroundings:
             room = np.vstack([room, distances - self._clearance_m])
             names += [self._names[i] for i in index]
         # A vehicle that is out of bounds already may come back, but not go further.
-        bad = room < np.minimum(room[:, :1], 0.0) - SLACK_M
+        bad = room < np.where(room[:, :1] < 0.0, room[:, :1] - SLACK_M, 0.0)
         hits = np.flatnonzero(bad.any(axis=0))
-        note = f"walls not checked: place known to {position_std_m:.1f} m only" if blind else ""
+        note = "walls not checked: what stands in this world is not known" if self._unknown else ""
+        if blind:
+            note = f"walls not checked: place known to {position_std_m:.1f} m only"
         if not hits.size:
             return Way(path, closed, note)
         first = int(hits[0])
@@ -86,7 +90,8 @@ class Surroundings:
         left_m = float(way_of(points[:first])[-1])
         if left_m < MIN_PATH_M:
             raise UnfitError(f"{what} {left_m:.1f} m ahead")
-        return Way(path[:first], False, f"ends after {left_m:.1f} m: {what} ahead")
+        cut = f"ends after {left_m:.1f} m: {what} ahead"
+        return Way(path[:first], False, f"{cut}; {note}" if note else cut)
 
     def _limits(self, points_m: Array) -> tuple[Array, list[str]]:
         """Room (3, M) that is left to each limit, and the limits' names."""

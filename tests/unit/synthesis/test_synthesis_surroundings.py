@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from services.autopilot.config import Config as AutopilotConfig
+from services.autopilot.fence import Fence
 from services.synthesis.config import Config
 from services.synthesis.primitives.shape import UnfitError
 from services.synthesis.surroundings import Surroundings
@@ -101,19 +103,34 @@ def test_a_vehicle_beside_a_wall_may_go_along_it_and_away_but_not_nearer():
     ],
 )
 def test_a_path_ends_at_the_limits_and_names_them(path, reason):
-    way = Surroundings(CONFIG).keep(path, closed=False)
+    way = Surroundings(CONFIG, ()).keep(path, closed=False)
     assert reason in way.note
-    x, y, z = way.path[-1, :3]
-    assert math.hypot(x, y) <= 100.0 + 0.02
-    assert 0.3 - 0.02 <= z <= 10.0 + 0.02
     assert len(way.path) > 100
+
+
+@pytest.mark.parametrize("shift_m", np.arange(0.0, 0.1, 0.005))
+@pytest.mark.parametrize("climb_mpm", [0.0, 1.0])
+def test_what_is_left_of_a_path_at_a_limit_can_be_accepted(shift_m, climb_mpm):
+    path = straight(begin=(95.0 + shift_m, 0.0, 5.0 + shift_m), climb_mpm=climb_mpm)
+    way = Surroundings(CONFIG, ()).keep(path, closed=False)
+    assert way.note
+    assert Fence(AutopilotConfig()).holds(way.path[:, :3])
+
+
+def test_a_path_in_a_world_that_is_not_known_says_so():
+    way = Surroundings(CONFIG, None).keep(straight(), closed=False)
+    assert len(way.path) == 201
+    assert "not known" in way.note
+    way = Surroundings(CONFIG, None).keep(straight(begin=(85.0, 0.0, 1.0)), closed=False)
+    assert "the geofence" in way.note
+    assert "not known" in way.note
 
 
 def test_a_vehicle_out_of_bounds_may_come_back():
     back = straight(length_m=30.0, begin=(110.0, 0.0, 1.0), heading=math.pi)
-    assert not Surroundings(CONFIG).keep(back, closed=False).note
+    assert not Surroundings(CONFIG, ()).keep(back, closed=False).note
     with pytest.raises(UnfitError, match="geofence"):
-        Surroundings(CONFIG).keep(straight(begin=(110.0, 0.0, 1.0)), closed=False)
+        Surroundings(CONFIG, ()).keep(straight(begin=(110.0, 0.0, 1.0)), closed=False)
 
 
 def test_bodies_are_not_looked_for_where_the_place_is_not_known_and_the_note_says_so():
