@@ -51,6 +51,7 @@ def at_most(found: float, bar: float, digits: int = 3) -> str:
 
 def _best(values: dict[str, Estimate]) -> tuple[str, float]:
     """The best peer and what it reaches."""
+    values = {name: value for name, value in values.items() if value.count}
     if not values:
         return "-", float("-inf")
     name = max(values, key=lambda name: values[name].mean)
@@ -96,6 +97,8 @@ def _families(results: Results) -> list[Bar]:
     rows: list[Bar] = []
     for family in results.families:
         found = results.f1(OURS, FAMILY + family)
+        if not found.count:
+            continue
         peers = {name: results.f1(name, FAMILY + family) for name in results.peers}
         text, peer = _best(peers)
         verdict = _above(found.mean, FAMILY_F1, peer)

@@ -90,7 +90,7 @@ def _early(results: Results, path: Path) -> str:
         bbox_to_anchor=(0.5, -0.14), frameon=False,
     )  # fmt: skip
     _save(figure, path)
-    count = results.pooled(results.models[0], CALIBRATED, [WHOLE]).count
+    count = results.count(CALIBRATED)
     return (
         f"Weighted F1 so long after a motion began, mean over seeds (left, n = {count} primitives"
         " in all) and over families (right); shaded: 95 % interval of ours."
@@ -209,7 +209,7 @@ def _families(results: Results, path: Path) -> str:
     panel.legend(fontsize=9, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     _clean(panel)
     _save(figure, path)
-    counts = [results.pooled(results.models[0], FAMILY + one, [WHOLE]).count for one in families]
+    counts = [results.count(FAMILY + one) for one in families]
     return (
         "Each family left out of training in turn: weighted F1 of its people"
         f" (n = {min(counts)} to {max(counts)} primitives a family)."

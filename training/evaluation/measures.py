@@ -106,16 +106,18 @@ class Estimate:
 
     def text(self, digits: int = 3, scale: float = 1.0) -> str:
         """As in tables: 0.953 ± 0.004."""
+        if not self.count:
+            return "-"
         if np.isnan(self.half):
             return f"{self.mean * scale:.{digits}f}"
         return f"{self.mean * scale:.{digits}f} ± {self.half * scale:.{digits}f}"
 
 
 def estimate(values: Iterable[float]) -> Estimate:
-    """The mean of values with its interval."""
+    """The mean of values with its interval; NaN of none."""
     found = np.array(list(values), dtype=np.float64)
     if len(found) < 2:
-        return Estimate(float(found.mean()), float("nan"), len(found))
+        return Estimate(float(found[0]) if len(found) else np.nan, np.nan, len(found))
     spread = found.std(ddof=1) / np.sqrt(len(found))
     return Estimate(
         float(found.mean()), float(stats.t.ppf(0.975, len(found) - 1) * spread), len(found)

@@ -42,6 +42,7 @@ def _classifiers(results: Results) -> Table:
         rows.append(
             (
                 name,
+                str(len(results.judged[name])),
                 results.f1(name, CALIBRATED).text(),
                 f"{swapped.text(1, 100)} %",
                 results.f1(name, KNOWN).text(),
@@ -50,8 +51,8 @@ def _classifiers(results: Results) -> Table:
                 f"{results.each(name, lambda result: result['fit_s']).mean:.0f} s",
             )
         )
-    rows += [(name, f"not run: {why}", *["-"] * 5) for name, why in results.not_run.items()]
-    count = results.pooled(results.models[0], CALIBRATED, [WHOLE]).count if results.models else 0
+    rows += [(name, f"not run: {why}", *["-"] * 6) for name, why in results.not_run.items()]
+    count = results.count(CALIBRATED) if results.models else 0
     own = (
         f" The thesis' machine on its own task (794 vectors of line, arc and sine, random 80/20"
         f" split) scores F1 {estimate(results.own_split).text()}; in the thesis 0.796."
@@ -64,6 +65,7 @@ def _classifiers(results: Results) -> Table:
         " left out: each family is one value. ECE: over all moments." + own,
         (
             "classifier",
+            "seeds",
             CALIBRATED,
             "arc <-> sine",
             "wide, families known",
@@ -79,11 +81,8 @@ def _families(results: Results) -> Table:
     rows = []
     for family in results.families:
         name = FAMILY + family
-        count = results.pooled(results.models[0], name, [WHOLE]).count
-        scores = (
-            f"{results.f1(model, name).mean:.3f}" if results.tallies(model, name, WHOLE) else "-"
-            for model in results.models
-        )
+        count = results.count(name)
+        scores = (results.f1(model, name).text() for model in results.models)
         rows.append((family, str(count), *scores))
     rows.append(("mean", "", *(results.of_families(model).text() for model in results.models)))
     return Table(

@@ -7,7 +7,7 @@ from functools import reduce
 from typing import Any
 
 from training.evaluation.measures import Estimate, Tally, estimate
-from training.evaluation.names import FAMILY, OURS
+from training.evaluation.names import FAMILY, OURS, WHOLE
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,13 @@ class Results:
             for name, asked in result["sets"].items()
             if name.startswith(people)
             for moment in moments
+        )
+
+    def count(self, people: str) -> int:
+        """Performances, in all seeds, that the classifier was judged on that has most of them."""
+        return max(
+            sum(tally.count for tally in self.tallies(model, people, WHOLE))
+            for model in self.models
         )
 
     def each(self, model: str, of: Callable[[dict[str, Any]], float]) -> Estimate:
