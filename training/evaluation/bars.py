@@ -63,7 +63,7 @@ def _above(found: float, bar: float, peer: float) -> str:
     verdict = at_least(found, bar)
     if found > peer:
         return verdict
-    behind = f"{peer - found:.3f} below the best peer"
+    behind = f"{peer - found:.3f} below a peer" if found < peer else "level with a peer"
     return f"not met: {behind}" if verdict == "met" else f"{verdict}, {behind}"
 
 
@@ -78,7 +78,7 @@ def _calibrated(results: Results) -> list[Bar]:
     return [
         Bar(
             "F1, calibrated people held out",
-            f">= {CALIBRATED_F1}, above every peer",
+            f">= {CALIBRATED_F1}, above peers",
             found.text(),
             text,
             _above(found.mean, CALIBRATED_F1, peer),
@@ -105,7 +105,7 @@ def _families(results: Results) -> list[Bar]:
         rows.append(
             Bar(
                 f"F1, family left out: {family}",
-                f">= {FAMILY_F1}, above every peer",
+                f">= {FAMILY_F1}, above peers",
                 found.text(),
                 text,
                 verdict,
@@ -132,7 +132,7 @@ def _early(results: Results) -> list[Bar]:
         rows.append(
             Bar(
                 f"F1 after {moment}, calibrated people",
-                f">= {bar:.2f}, above every peer",
+                f">= {bar:.2f}, above peers",
                 found.text(),
                 text,
                 _above(found.mean, bar, peer),

@@ -15,6 +15,7 @@ from matplotlib.transforms import Bbox
 
 from training.dataset.figures import draw_lengths
 from training.evaluation.bars import EARLY_F1, FAMILY_F1
+from training.evaluation.contenders import CONTENDERS
 from training.evaluation.measures import Tally
 from training.evaluation.names import CALIBRATED, FAMILY, MOMENTS, OURS, THESIS, WHOLE
 from training.evaluation.results import Results
@@ -33,9 +34,8 @@ LENGTHS_OF = 40
 Drawn = tuple[str, str]
 
 
-def _look(results: Results, model: str) -> dict[str, Any]:
-    number = results.models.index(model) if OURS in results.models else 1
-    number += results.models.index(model) if OURS not in results.models else 0
+def _look(model: str) -> dict[str, Any]:
+    number = CONTENDERS.index(model)
     return {
         "color": COLOURS[number % len(COLOURS)],
         "marker": MARKS[number % len(MARKS)],
@@ -70,7 +70,7 @@ def _early(results: Results, path: Path) -> str:
                 for moment in MOMENTS
             ]
             means = np.array([one.mean for one in found])
-            look = _look(results, model)
+            look = _look(model)
             panel.plot(at, means, label=model, **look)
             if model == OURS:
                 half = np.nan_to_num([one.half for one in found])
@@ -201,7 +201,7 @@ def _families(results: Results, path: Path) -> str:
     figure, panel = plt.subplots(figsize=(8.4, 0.38 * len(families) + 1.4))
     for model in results.models:
         means = [results.f1(model, FAMILY + family).mean for family in order]
-        look = _look(results, model) | {"linestyle": "none"}
+        look = _look(model) | {"linestyle": "none"}
         panel.plot(means, range(len(order)), label=model, **look)
     panel.axvline(FAMILY_F1, color="#a33c00", linestyle="--", linewidth=1.2, label="bar")
     panel.set_yticks(range(len(order)), order)
@@ -219,8 +219,9 @@ def _families(results: Results, path: Path) -> str:
 def _picture(table: Table, path: Path) -> str:
     """The table of bars as a picture."""
     columns = zip(table.header, *table.rows, strict=True)
-    widths = [max(len(cell) for cell in column) + 3 for column in columns]
-    figure, panel = plt.subplots(figsize=(0.075 * sum(widths), 0.27 * (len(table.rows) + 1)))
+    widths = [max(len(cell) for cell in column) + 3.0 for column in columns]
+    widths[-1] *= 1.2  # it is bold
+    figure, panel = plt.subplots(figsize=(0.086 * sum(widths), 0.27 * (len(table.rows) + 1)))
     panel.axis("off")
     grid = panel.table(
         cellText=table.rows,
