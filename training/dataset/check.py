@@ -130,8 +130,11 @@ def _duplicates(primitives: Sequence[Primitive], rows: Sequence[int]) -> list[Fi
     first: dict[bytes, tuple[int, Primitive]] = {}
     findings = []
     for row, p in zip(rows, primitives, strict=True):
+        # Rests of the same length are alike, whoever rests.
+        if not p.sticks.any():
+            continue
         earlier, other = first.setdefault(p.sticks.tobytes(), (row, p))
-        if earlier != row and len(p):
+        if earlier != row:
             note = f" but called {other.label}" if other.label != p.label else ""
             text = f"{p.label} by {p.operator}: the same sticks as row {earlier}{note}; keep one"
             findings.append(Finding(row, text))

@@ -35,7 +35,8 @@ def read_joy(path: Path, axes: Axes) -> tuple[list[Track], list[Problem]]:
         except yaml.YAMLError as error:
             reason = " ".join(str(error).split())
             builder.reject(where, f"no YAML, cut off perhaps: {reason[:100]}; it is left out")
-        except (ValueError, TypeError) as error:
+        # A whole number of 400 digits is none that a float holds.
+        except (ValueError, TypeError, OverflowError) as error:
             builder.reject(where, f"{error}; it is left out")
         else:
             held = tuple(

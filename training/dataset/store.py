@@ -12,6 +12,7 @@ Arrays of schema 1, for n primitives of N samples together:
 """
 
 import json
+import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -141,6 +142,11 @@ def open_set(path: Path) -> Stored:
     """
     if not path.is_file():
         raise DatasetError(f"{path}: no such file")
+    with path.open("rb") as stream:
+        if not zipfile.is_zipfile(stream):
+            raise DatasetError(
+                f"{path} is no data set, or cut off; take its backup or import its sources again"
+            )
     try:
         with np.load(path, allow_pickle=False) as file:
             if not isinstance(file, np.lib.npyio.NpzFile) or "schema" not in file:
@@ -153,12 +159,15 @@ def open_set(path: Path) -> Stored:
                     f"{path} has schema {schema}, this program reads {SCHEMA};"
                     " import its sources again"
                 )
+            missing = [name for name in ARRAYS if name not in file]
+            if missing:
+                raise DatasetError(
+                    f"{path} lacks its array {', '.join(missing)}; import its sources again"
+                )
             arrays = {name: file[name] for name in ARRAYS}
         provenance = json.loads(str(arrays.pop("provenance")))
     except DatasetError:
         raise
-    except KeyError as error:
-        raise DatasetError(f"{path} lacks its array {error}; import its sources again") from None
     # What zipfile, zlib and numpy raise for bytes that are broken is of many kinds.
     except Exception as error:
         raise DatasetError(
@@ -166,7 +175,9 @@ def open_set(path: Path) -> Stored:
             " take its backup or import its sources again"
         ) from None
     _require_shapes(path, arrays)
-    return Stored(path, arrays, {str(k): str(v) for k, v in dict(provenance).items()})
+    if not isinstance(provenance, dict):
+        raise DatasetError(f"{path}: provenance is no JSON map; import its sources again")
+    return Stored(path, arrays, {str(k): str(v) for k, v in provenance.items()})
 
 
 def _require_shapes(path: Path, arrays: dict[str, Any]) -> None:

@@ -22,7 +22,7 @@ class Problem:
     """Something of a file that cannot be used.
 
     Attributes:
-        path: which file.
+        path: which file, "" where the text names it.
         where: which row, document or cell of it.
         text: what is wrong and what to do.
     """
@@ -32,9 +32,7 @@ class Problem:
     text: str
 
     def __str__(self) -> str:
-        return (
-            f"{self.path}: {self.where}: {self.text}" if self.where else f"{self.path}: {self.text}"
-        )
+        return ": ".join(part for part in (self.path, self.where, self.text) if part)
 
 
 @dataclass(frozen=True, eq=False)

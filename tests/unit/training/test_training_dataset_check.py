@@ -68,7 +68,7 @@ def tilted(angle_rad: float, **changes: object) -> Primitive:
 def test_a_sound_set_has_no_fault() -> None:
     assert check([tilted(0.1 * number) for number in range(6)]) == []
     rest = primitive(sticks=np.zeros((150, 4)), label="none")
-    assert check([tilted(0.0), rest]) == []
+    assert check([tilted(0.0), rest, rest]) == []
 
 
 def test_the_same_sticks_twice_are_found_with_their_labels() -> None:

@@ -141,12 +141,13 @@ def test_bad_documents_of_joy_are_named_and_the_rest_is_read(tmp_path: Path) -> 
     documents[7] = "axes: [0, 0, 0, 0]\n"
     documents[8] = documents[8].replace("secs", "hours")
     documents[9] = documents[9].replace("axes: [", "axes: [x, ")
+    documents[10] = documents[10].replace("axes: [", f"axes: [{'9' * 400}, ")
     documents[12] = documents[12].replace("axes:", "axes: [0.1]\nother:")
     documents[-1] = documents[-1][: len(documents[-1]) // 2]
     path = tmp_path / "joy.yaml"
     path.write_text("---\n".join(documents))
     problems = problems_of(path)
-    wrong = (5, 6, 7, 8, 9, 12, len(documents) - 1)
+    wrong = (5, 6, 7, 8, 9, 10, 12, len(documents) - 1)
     assert [int(problem.split()[1]) - 1 for problem in problems] == list(wrong)
     for problem, reason in zip(
         problems,
@@ -156,6 +157,7 @@ def test_bad_documents_of_joy_are_named_and_the_rest_is_read(tmp_path: Path) -> 
             "header.stamp is missing",
             "lacks its secs or nsecs",
             "axes is no list of numbers",
+            "int too large",
             "1 axes, but --axes names 4",
             "",
         ),

@@ -95,13 +95,15 @@ def rewritten(path: Path, **arrays: object) -> Path:
     [
         ({"schema": np.int64(99)}, "has schema 99, this program reads 1"),
         ({"schema": None}, "is no data set"),
-        ({"sticks": None}, "lacks its array"),
+        ({"sticks": None}, "lacks its array sticks; import"),
         ({"sticks": np.zeros((3, 4))}, "sticks has shape"),
         ({"offsets": np.array([0, 400, 300])}, "offsets do not divide"),
         ({"times_s": np.full(300, "0")}, "times_s holds <U1"),
         ({"label": np.array(["arc", "spiral"])}, "row 1: label 'spiral' is unknown; use line"),
         ({"label": np.array(["arc", None], dtype=object)}, "is no data set"),
         ({"provenance": np.array("{")}, "is no data set"),
+        ({"provenance": np.array("[1, 2]")}, "provenance is no JSON map"),
+        ({"provenance": np.array("null")}, "provenance is no JSON map"),
     ],
 )
 def test_a_set_of_another_shape_is_refused(
@@ -115,7 +117,7 @@ def test_a_set_of_another_shape_is_refused(
 def test_what_is_no_set_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "set.npz"
     path.write_bytes(content)
-    with pytest.raises(DatasetError):
+    with pytest.raises(DatasetError, match=r"set\.npz is no data set, or cut off; take"):
         load(path)
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("notes.txt", "hello")
