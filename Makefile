@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --disable-pip-version-check -c constraints.t
 SCRIPTS := .ci/run deploy/install
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo up check test test-compose bench bench-simulator fits flight properties people train evaluate picture shapes lock docs format clean
+.PHONY: help setup demo up check test test-compose bench bench-classifier bench-simulator fits flight properties people train evaluate picture shapes lock docs format clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -76,10 +76,11 @@ fits: setup $(VENV)/.all ## fits of hidden shapes beside an oracle, their errors
 bench: setup $(VENV)/.all ## rates and latencies of the whole chain, as a table
 	$(BIN)/python tests/performance/bench.py $(ARGS)
 
+bench-classifier: setup $(VENV)/.all ## how long the classifier takes for one window
+	$(BIN)/python tests/performance/inference.py $(ARGS)
+
 bench-simulator: setup $(VENV)/.all ## how fast the simulator is beside others, and 10 minutes of it
 	$(BIN)/python tests/performance/simulator.py $(ARGS)
-
-# --- making --------------------------------------------------------------------------------------
 
 flight: setup $(VENV)/.all ## how closely paths are flown, against other controllers: 20 minutes
 	$(BIN)/python tests/performance/flight.py $(ARGS)
@@ -90,11 +91,13 @@ properties: setup $(VENV)/.all ## the autopilot's rules in 100 000 random steps,
 people: setup $(VENV)/.all ## the thesis' SVM on the simulated operators scores as in the thesis
 	$(BIN)/python -m pytest tests/unit/training/test_training_generator_calibration.py -m slow $(ARGS)
 
-train: $(VENV)/.all ## train the model anew into models/
-	$(BIN)/autocomplete train $(ARGS)
-
 evaluate: $(VENV)/.evaluation ## every classifier on the same people, against the bars: hours
 	$(BIN)/autocomplete evaluate $(ARGS)
+
+# --- making --------------------------------------------------------------------------------------
+
+train: $(VENV)/.all ## train the model anew into models/
+	$(BIN)/autocomplete train $(ARGS)
 
 picture: setup $(VENV)/.all ## the README's picture anew: flies the demo and photographs the console
 	$(BIN)/python docs/picture.py
