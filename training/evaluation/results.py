@@ -19,7 +19,7 @@ class Results:
         human: by data set, then by seed: `ours`, `padded`, `stretched`, `n`.
         not_run: classifiers without results, and why.
         latency: `p50_s`, `p99_s`, `count` of the shipped model; empty if there is none.
-        own_split: of each seed, F1 of the thesis' machine on its own split of 794 vectors.
+        own_split: F1 of the thesis' machine on its own split of 794 vectors, of several sets.
     """
 
     judged: dict[str, dict[int, dict[str, Any]]]
