@@ -116,7 +116,9 @@ class Controller:
         wanted = reference.yaw_acceleration_radps2 + pull - self.disturbance.yaw_radps2
         wz = (turn_radps + wanted / response.rate_ps) / response.speed
         self._yaw_saturated = abs(wz) > 1.0
-        return Sticks(vx, vy, vz, max(-1.0, min(1.0, wz)))
+        # Unlike max and min, this leaves what is no number to the guard.
+        (wz,) = limit_norm([wz], 1.0)
+        return Sticks(vx, vy, vz, wz)
 
     def _level(
         self,
@@ -149,7 +151,8 @@ class Controller:
         response = self.plant.up if wanted > 0.0 else self.plant.down
         vz = wanted / response.speed
         self._up_saturated = abs(vz) > 1.0
-        return max(-1.0, min(1.0, vz))
+        (vz,) = limit_norm([vz], 1.0)
+        return vz
 
 
 def within(wanted: list[float], along: tuple[float, float], limit: float) -> list[float]:

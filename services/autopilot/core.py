@@ -3,6 +3,7 @@
 Pure: every method gets the receiver's monotonic time `now_ns`, and the stamp for what goes out.
 """
 
+import math
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,6 +27,11 @@ SUGGESTIONS = 8
 
 MAX_DT_S = 0.1
 """Longest time that one step of the follower integrates over."""
+
+FARTHEST_M = 1e5
+FASTEST_MPS = 100.0
+FASTEST_RADPS = 100.0
+"""Poses beyond these are those of an estimator that diverged, and count as none."""
 
 DEFAULT_PLANT: m.Plant = "tum"
 """Until the vehicle says what it is."""
@@ -103,9 +109,15 @@ class Autopilot:
         return self._output(now_ns, stamp_ns, due=self._state.mode == "manual")
 
     def on_pose(self, pose: m.Pose, now_ns: int) -> None:
-        """Take a pose in; a lost one, or one older than the newest, is none."""
+        """Take a pose in; a lost, an impossible one, or one older than the newest, is none."""
         fresh = self._pose_is_fresh(now_ns)
         if pose.status == "lost" or (fresh and self._pose and pose.seq < self._pose.seq):
+            return
+        if (
+            math.hypot(*pose.position) > FARTHEST_M
+            or math.hypot(*pose.velocity) > FASTEST_MPS
+            or math.hypot(*pose.angular_velocity) > FASTEST_RADPS
+        ):
             return
         if not fresh:
             self._poses_since_ns = now_ns
@@ -124,6 +136,7 @@ class Autopilot:
         self._vehicle = vehicle
         if vehicle.plant != self._controller.plant_name:
             self._controller = Controller(vehicle.plant, self._config)
+            self._hold = None
             self._happen(Event.VEHICLE_CHANGED, now_ns)
         self._watch(now_ns)
 
@@ -338,10 +351,11 @@ class Autopilot:
             self._happen(Event.GEOFENCE, now_ns)
 
     def _may_hold(self, now_ns: int) -> bool:
-        """Whether a place may be kept: in flight, with steady links: what is new may jump."""
+        """Whether a place may be kept: in flight, hands off, links steady: what is new may jump."""
         since_ns = self._link.steady_since_ns(now_ns)
         return (
             self._state.action == "fly"
+            and not self._link.is_deflected(now_ns)
             and self._vehicle is not None
             and self._vehicle.state == "flying"
             and since_ns is not None

@@ -50,7 +50,7 @@ class Path:
         raw = np.asarray(points, dtype=np.float64)
         if closed:
             raw = np.vstack([raw, raw[:1]])
-        raw[:, 3] = np.unwrap(raw[:, 3])
+        raw[:, 3] = np.unwrap(np.remainder(raw[:, 3], 2.0 * math.pi))
         steps = np.linalg.norm(np.diff(raw[:, :3], axis=0), axis=1)
         raw = raw[np.concatenate([[True], steps > 1e-6])]
         along = np.concatenate([[0.0], np.cumsum(steps[steps > 1e-6])])

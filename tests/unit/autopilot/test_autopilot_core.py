@@ -270,6 +270,27 @@ class TestLosses:
             rig.deflect(vx=0.2)
         assert (rig.command.mode, rig.command.action) == ("manual", "fly")
 
+    @pytest.mark.parametrize(
+        "wild",
+        [
+            {"position": (1e200, 0.0, 1.0)},
+            {"velocity": (0.0, 0.0, 1e308)},
+            {"velocity": (0.0, 0.0, -1e308)},
+            {"yaw_rate": 1e308},
+        ],
+    )
+    def test_poses_of_an_estimator_that_diverged_are_none(self, rig, wild):
+        rig.engage(line())
+        rig.run(1.0)
+        rig.poses = False
+        for seq in range(1000, 1030):
+            rig.autopilot.on_pose(pose(seq, **wild), rig.now_ns)
+            rig.run(0.02)
+        assert (rig.command.mode, rig.status.reason) == ("hover", "pose_lost")
+        rig.poses = True
+        rig.run(3.0)
+        assert max(map(abs, rig.velocity_command)) < 0.1
+
     def test_far_from_the_path_it_is_given_up(self, rig):
         rig.engage(line())
         rig.run(1.0)
@@ -348,6 +369,16 @@ class TestHover:
         rig.autopilot.on_vehicle(vehicle(state), rig.now_ns)
         rig.run(0.04)
         assert rig.velocity_command == NEUTRAL
+
+    def test_it_does_not_work_against_a_stick_that_is_still_held(self):
+        rig = Rig(LaggingVehicle(wind_mps=(0.0, 0.3)))
+        rig.run(3.0)
+        rig.deflect(vx=-1.0)
+        rig.autopilot.on_vehicle(vehicle("landed"), rig.now_ns)
+        rig.autopilot.on_vehicle(vehicle("flying"), rig.now_ns)
+        rig.sticks = False
+        rig.run(0.1)
+        assert (rig.command.mode, rig.velocity_command) == ("hover", NEUTRAL)
 
     def test_the_change_from_path_to_place_is_smooth(self):
         rig = Rig(LaggingVehicle(noise=0.0, wind_mps=(0.2, 0.3)))
@@ -458,6 +489,14 @@ def test_another_plant_ends_the_path(rig):
     rig.autopilot.on_vehicle(vehicle("flying", plant="ardrone"), rig.now_ns)
     rig.run(0.02)
     assert (rig.command.mode, rig.status.reason) == ("hover", "vehicle_changed")
+
+
+def test_another_plant_is_held_by_its_own_model(rig):
+    rig.run(3.0)
+    assert rig.autopilot._hold is not None
+    rig.autopilot.on_vehicle(vehicle("flying", plant="ardrone"), rig.now_ns)
+    rig.run(0.02)
+    assert rig.autopilot._hold._controller.plant_name == "ardrone"
 
 
 class TestTakeoffLandEmergency:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from services.autopilot.config import Config
-from services.autopilot.control import Controller
+from services.autopilot.control import Controller, Reference
 from services.autopilot.disturbance import Disturbance
 from services.autopilot.follower import Follower
 from services.autopilot.path import BadPathError, Path
@@ -154,6 +154,19 @@ def test_speeds_fall_no_faster_than_the_vehicle_brakes():
     squares = follower._plan_mps**2
     assert np.diff(squares).min() >= -2.0 * 0.6 * follower._path.spacing_m - 1e-9
     assert follower._plan_mps[: len(squares) // 2 + 20].min() < 0.5
+
+
+@pytest.mark.parametrize("where", ["up_mps2", "yaw_radps2", "plane_mps2"])
+def test_what_is_no_number_is_left_to_the_guard_and_is_no_full_stick(where):
+    controller = Controller("tum", Config())
+    setattr(controller.disturbance, where, [math.nan] * 2 if where == "plane_mps2" else math.nan)
+    sticks = controller.sticks(pose(1), 0.0, Reference((0.0, 0.0, 1.0), 0.0), PERIOD_S)
+    assert any(map(math.isnan, (sticks.vx, sticks.vy, sticks.vz, sticks.wz)))
+
+
+def test_yaws_however_large_are_angles():
+    path = Path([(x, y, z, (-1.0) ** i * 1e308) for i, (x, y, z, _) in enumerate(line())], False)
+    assert all(map(math.isfinite, (path.at(1.0).yaw_rad, path.at(1.0).yaw_rate_radpm)))
 
 
 class TestDisturbance:
