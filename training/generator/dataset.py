@@ -208,17 +208,20 @@ def _nothing(
     return sticks, samples, good
 
 
-def hovering(
-    operators: int, seconds: float, seed: int, families: Sequence[Family] = FAMILIES
-) -> list[Primitive]:
-    """Hover corrections without a pause, `seconds` of each of `operators` people."""
-    return [primitive for primitive, _ in holds(operators, seconds, seed, families)]
-
-
 def holds(
     operators: int, seconds: float, seed: int, families: Sequence[Family] = FAMILIES
 ) -> list[tuple[Primitive, Array]]:
-    """As `hovering`, each with x y z in m and yaw in rad (N, 4) of the vehicle, every `STEP_S`."""
+    """Hover corrections without a pause, and where the vehicle was.
+
+    Args:
+        operators: how many people.
+        seconds: how long each holds the place.
+        seed: the same seed gives the same.
+        families: kinds of people, in turn.
+
+    Returns:
+        Of each person the sticks, and x y z in m and yaw in rad (N, 4) every `STEP_S`.
+    """
     members = [families[k % len(families)] for k in range(operators)]
     rng = np.random.default_rng(seed)
     people = draw_people(members, rng)

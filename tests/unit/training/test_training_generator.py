@@ -12,7 +12,7 @@ from training.generator.dataset import (
     THESIS,
     THESIS_COUNTS,
     generate,
-    hovering,
+    holds,
     populate,
 )
 from training.generator.people import FAMILIES, TRAITS, People, Style, draw_people
@@ -101,9 +101,11 @@ def test_a_helix_climbs_and_an_arc_does_not(primitives: list[Primitive]) -> None
 
 
 def test_hover_corrections_stay_where_they_are() -> None:
-    for primitive in hovering(12, 20.0, seed=2):
+    for primitive, places in holds(12, 20.0, seed=2):
         assert primitive.label == NONE
         assert primitive.duration_s == pytest.approx(20.0, abs=0.3)
+        assert places.shape == (20.0 / observer.STEP_S + 1, 4)
+        assert np.abs(places[:, :3]).max() < 2.5
         assert np.abs(primitive.sticks[:, :3]).max() > 0.1
         # Pushes to both sides: nobody flies away.
         assert np.abs(primitive.sticks[:, :3].mean(axis=0)).max() < 0.4
