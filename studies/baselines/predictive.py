@@ -2,8 +2,7 @@
 
 Same path, same plan of speeds, same model of the plant, same estimate of the wind, same limits of
 the sticks and the same PIDs of height and yaw as the autopilot's follower: only the plane's law
-differs. The thesis says
-that one was tried and was not superior.
+differs. The thesis says that one was tried and was not superior.
 """
 
 from functools import cache

@@ -156,6 +156,8 @@ def main() -> int:
     parser.add_argument("--output", type=Path, help="also write every flight as JSON")
     options = parser.parse_args()
     methods = options.methods.split(",")
+    if "autopilot" not in methods or not set(methods) <= set(METHODS):
+        parser.error(f"--methods: must hold autopilot; others are {', '.join(METHODS)}")
     every: list[Outcome] = []
     met = True
     for seen, seeds in ((False, options.seeds), (True, options.seen)):
