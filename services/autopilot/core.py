@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from common import messages as m
 from common.clock import NS_PER_S, nanoseconds, seconds
+from common.topics import TOPICS
 from services.autopilot.arbitration import Event, State
 from services.autopilot.config import Config
 from services.autopilot.control import NEUTRAL, Controller, Sticks
@@ -32,6 +33,9 @@ FARTHEST_M = 1e5
 FASTEST_MPS = 100.0
 FASTEST_RADPS = 100.0
 """Poses beyond these are those of an estimator that diverged, and count as none."""
+
+STANDSTILL_S = 1.0
+"""After so long without a step nobody knows how long a question has waited."""
 
 DEFAULT_PLANT: m.Plant = "tum"
 """Until the vehicle says what it is."""
@@ -78,6 +82,7 @@ class Autopilot:
         self._pose_ns: int | None = None
         self._poses_since_ns = now_ns
         self._vehicle: m.VehicleStatus | None = None
+        self._vehicle_ns: int | None = None
         self._suggestions: OrderedDict[int, tuple[m.Suggestion, int]] = OrderedDict()
         self._answers: OrderedDict[int, m.DecideReply] = OrderedDict()
         self._follower: PathFollower | None = None
@@ -133,7 +138,7 @@ class Autopilot:
 
     def on_vehicle(self, vehicle: m.VehicleStatus, now_ns: int) -> None:
         """Take the vehicle's own state in."""
-        self._vehicle = vehicle
+        self._vehicle, self._vehicle_ns = vehicle, now_ns
         if vehicle.plant != self._controller.plant_name:
             self._controller = Controller(vehicle.plant, self._config)
             self._hold = None
@@ -177,9 +182,9 @@ class Autopilot:
             missing.append("no sticks")
         if not self._pose_is_fresh(now_ns):
             missing.append("no pose")
-        if self._vehicle is None:
+        if self._older(self._vehicle_ns, now_ns, TOPICS["vehicle"].max_age_s):
             missing.append("no vehicle")
-        elif self._battery <= self._config.battery_low:
+        if self._battery <= self._config.battery_low:
             missing.append(f"battery {self._battery:.0%}")
         still_s = self._link.still_s(now_ns)
         if still_s > self._config.stuck_s / 2.0:
@@ -252,8 +257,11 @@ class Autopilot:
                 return str(told)
             if mode == "emergency" and told != "landed":
                 return mode
-        if event in (Event.TAKEOFF, Event.ACCEPT) and self._battery <= self._config.battery_low:
-            return "battery_low"
+        if event in (Event.TAKEOFF, Event.ACCEPT):
+            if self._older(self._observed_ns, now_ns, STANDSTILL_S):
+                return "late"
+            if self._battery <= self._config.battery_low:
+                return "battery_low"
         # The operator lets go first: a stick still held would take over in the same step. Sticks
         # that do not count cannot, so they keep nobody from landing.
         accepting = event is Event.ACCEPT
