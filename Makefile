@@ -11,7 +11,7 @@ SCRIPTS := .ci/run deploy/install
 .PHONY: help setup demo up check test test-compose bench bench-classifier bench-simulator fits flight properties people train evaluate picture shapes lock docs format clean
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-17s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 # --- setting up ----------------------------------------------------------------------------------
 
