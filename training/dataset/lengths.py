@@ -8,7 +8,6 @@ import numpy as np
 from training.dataset.primitive import Primitive
 
 Over = Literal["newest", "resample", "drop"]
-OVERS: tuple[Over, ...] = ("newest", "resample", "drop")
 
 
 @dataclass(frozen=True)
