@@ -16,6 +16,8 @@ EARLY_F1 = {"1.0 s": 0.70, "1.5 s": 0.80, "2.0 s": 0.88, "3.0 s": 0.93}
 CALIBRATION_ERROR = 0.03
 NONE_AUROC = 0.97
 ROBUST_POINTS = 2.0
+LEVEL = 5e-4
+"""F1 that differ by less look the same in a table."""
 GAINED_POINTS, LOST_POINTS = 3.0, 0.5
 P50_S, P99_S = 0.2e-3, 0.3e-3
 
@@ -63,7 +65,8 @@ def _above(found: float, bar: float, peer: float) -> str:
     verdict = at_least(found, bar)
     if found > peer:
         return verdict
-    behind = f"{peer - found:.3f} below a peer" if found < peer else "level with a peer"
+    is_level = peer - found < LEVEL
+    behind = "level with a peer" if is_level else f"{peer - found:.3f} below a peer"
     return f"not met: {behind}" if verdict == "met" else f"{verdict}, {behind}"
 
 

@@ -161,10 +161,10 @@ def _confusions(results: Results, path: Path) -> str:
         _confusion(panel, results.pooled(model, CALIBRATED, [WHOLE]), model)
     panels[0, 0].set_ylabel("was")
     _save(figure, path)
-    count = results.pooled(models[0], CALIBRATED, [WHOLE]).count
+    counts = (str(results.pooled(model, CALIBRATED, [WHOLE]).count) for model in models)
     return (
         "Figure 5.7 of the thesis, remade: confusions at the end of a primitive, calibrated people"
-        f" held out, all seeds together (n = {count})."
+        f" held out, all seeds together (n = {' and '.join(counts)})."
     )
 
 
@@ -210,9 +210,10 @@ def _families(results: Results, path: Path) -> str:
     _clean(panel)
     _save(figure, path)
     counts = [results.count(FAMILY + one) for one in families]
+    few, many = min(counts), max(counts)
     return (
         "Each family left out of training in turn: weighted F1 of its people"
-        f" (n = {min(counts)} to {max(counts)} primitives a family)."
+        f" (n = {few if few == many else f'{few} to {many}'} primitives a family)."
     )
 
 

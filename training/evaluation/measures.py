@@ -108,9 +108,9 @@ class Estimate:
         """As in tables: 0.953 ± 0.004."""
         if not self.count:
             return "-"
-        if np.isnan(self.half):
-            return f"{self.mean * scale:.{digits}f}"
-        return f"{self.mean * scale:.{digits}f} ± {self.half * scale:.{digits}f}"
+        # Adding 0 makes -0.0 a plain 0.
+        mean = f"{round(self.mean * scale, digits) + 0.0:.{digits}f}"
+        return mean if np.isnan(self.half) else f"{mean} ± {self.half * scale:.{digits}f}"
 
 
 def estimate(values: Iterable[float]) -> Estimate:
