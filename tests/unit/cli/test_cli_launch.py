@@ -143,9 +143,18 @@ def is_running(pid: int) -> bool:
 
 def test_a_closed_terminal_stops_a_process_in_order() -> None:
     endpoint = f"tcp/127.0.0.1:{(port := free_port())}"
-    with subprocess.Popen([COMMAND, "router", "--listen", endpoint]) as process:
+    # Tests under nohup would hand on that the signal is to be survived.
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    try:
+        process = subprocess.Popen([COMMAND, "router", "--listen", endpoint])
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    try:
         deadline = time.monotonic() + TIMEOUT_S
         while launch.is_free(port) and time.monotonic() < deadline:
             time.sleep(0.05)
         process.send_signal(signal.SIGHUP)
         assert process.wait(TIMEOUT_S) == 0
+    finally:
+        process.kill()
+        process.wait()
