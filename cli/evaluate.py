@@ -5,18 +5,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TaskID,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import Progress, TaskID
 from rich.table import Table as Grid
 
 from cli import options as opts
+from cli.progress import counted
 
 if TYPE_CHECKING:
     from training.evaluation.tables import Table
@@ -28,8 +21,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--out",
         metavar="FOLDER",
         type=Path,
-        default=Path("evaluation"),
-        help="where results and report go; results that are there are not found again (evaluation)",
+        help="where results and report go; results that are there are not found again"
+        " (evaluation, or evaluation-quick with --quick)",
     )
     parser.add_argument(
         "--seeds", type=_seeds, metavar="0,1,...", help="of people and training (all five)"
@@ -49,7 +42,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     opts.add_examples(
         parser,
         "autocomplete evaluate                       # everything; begun again, it goes on",
-        "autocomplete evaluate --quick --out /tmp/e  # minutes; its figures mean nothing",
+        "autocomplete evaluate --quick               # minutes; its figures mean nothing",
         "autocomplete evaluate --models 'cnn-gru,geometry + ExtraTrees' --seeds 0,1",
     )
     parser.set_defaults(action=_run)
@@ -92,26 +85,20 @@ def _run(options: argparse.Namespace) -> int:
         unknown = [name for name in models if name not in CONTENDERS]
         if unknown:
             raise ValueError(f"--models {unknown[0]!r}: use {', '.join(CONTENDERS)}")
+    out: Path = options.out or Path("evaluation-quick" if options.quick else "evaluation")
     order = Order(
-        out=options.out,
+        out=out,
         seeds=options.seeds or (ALL_SEEDS[:1] if options.quick else ALL_SEEDS),
         models=models,
         size="quick" if options.quick else "full",
         people=options.people,
     )
     console = Console()
-    columns = (
-        TextColumn("{task.description:44}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console) as progress:
+    with counted(console) as progress:
         tables = evaluate(order, SystemClock(), _Bars(progress).show)
     for table in tables:
         console.print(_grid(table))
-    console.print(f"{options.out / 'report.html'}  {options.out / 'report.md'}")
+    console.print(f"{out / 'report.html'}  {out / 'report.md'}")
     return 0
 
 

@@ -7,18 +7,11 @@ from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TaskID,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import Progress, TaskID
 from rich.table import Table
 
 from cli import options as opts
+from cli.progress import counted
 
 if TYPE_CHECKING:
     from training.fit import Epoch
@@ -29,7 +22,8 @@ PRESETS = ("shipped", "quick")
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument(
+    job = parser.add_mutually_exclusive_group()
+    job.add_argument(
         "--preset",
         choices=PRESETS,
         default="shipped",
@@ -40,15 +34,15 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--out",
         metavar="FOLDER",
         type=Path,
-        default=Path("models"),
-        help="where intent.onnx, its card README.md and its figures go (models/)",
+        help="where intent.onnx, its card README.md and its figures go (models/; models/quick/ with"
+        " --preset quick, models/finetuned/ with --finetune)",
     )
     parser.add_argument(
         "--resume",
         action="store_true",
         help="go on with a run of the same preset, seed and folder that was stopped",
     )
-    parser.add_argument(
+    job.add_argument(
         "--finetune",
         metavar="FILE",
         type=Path,
@@ -61,11 +55,17 @@ def declare(parser: argparse.ArgumentParser) -> None:
         default=Path("models/intent.onnx"),
         help="the model that --finetune begins with (models/intent.onnx)",
     )
-    parser.add_argument(
+    job.add_argument(
         "--ablation",
         metavar="FILE",
         type=Path,
-        help="instead, compare variants of the network (about 10 minutes) and write the page FILE",
+        help="compare variants of the network and write the page FILE",
+    )
+    opts.add_examples(
+        parser,
+        "autocomplete train                                # the shipped model anew, into models/",
+        "autocomplete train --preset quick                 # a minute, to see that it works",
+        "autocomplete train --finetune ana.npz --out models/ana   # adapted to Ana",
     )
     parser.set_defaults(action=_run)
 
@@ -105,15 +105,10 @@ def _run(options: argparse.Namespace) -> int:
         raise OSError(
             f"{error.name} is missing; install it with pip install -e '.[training]'"
         ) from None
+    if options.resume and (options.finetune or options.ablation):
+        raise ValueError("--resume goes on with a training; it has no meaning here")
     console = Console()
-    columns = (
-        TextColumn("{task.description:24}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console) as progress:
+    with counted(console) as progress:
         bars = _Bars(progress)
         if options.finetune is not None:
             return _finetune(console, options, bars)
@@ -122,7 +117,7 @@ def _run(options: argparse.Namespace) -> int:
         run = train(
             options.preset,
             options.seed,
-            options.out,
+            options.out or Path("models/quick" if options.preset == "quick" else "models"),
             bars,
             resume=options.resume,
             processes=1 if options.preset == "quick" else min(4, os.cpu_count() or 1),
@@ -138,7 +133,8 @@ def _finetune(console: Console, options: argparse.Namespace, bars: _Bars) -> int
     primitives, findings = load_sound(options.finetune)
     for finding in findings:
         console.print(f"left out: {finding}")
-    done = finetune(primitives, options.model, options.out, options.seed, bars.generating)
+    out = options.out or Path("models/finetuned")
+    done = finetune(primitives, options.model, out, options.seed, bars.generating)
     console.print(
         f"{done.performances} performances: F1 {done.before:.3f} before;"
         f" {done.after:.3f} after, on those left out of each of three adaptations"

@@ -13,7 +13,14 @@ from training.export import export, save
 from training.fit import FULL_YAW_RADPS, Budget, Epoch, Fitted, Training
 from training.labels import PRIMITIVES
 from training.people import Share, people_of
-from training.scores import Score, calibration_error, none_auroc, score, weighted_f1
+from training.scores import (
+    Score,
+    calibration_error,
+    confidence_bins,
+    none_auroc,
+    score,
+    weighted_f1,
+)
 from training.windows import NONE_INDEX, Examples, Windows, examples_of, seen_after
 
 MODEL_NAME = "intent"
@@ -140,7 +147,7 @@ def judge(name: str, model: OnnxModel, examples: Examples) -> Judged:
         name,
         score(truth, said, people, classes, 0),
         tuple(early),
-        calibration_error(whole[is_meant], truth),
+        calibration_error(confidence_bins(whole[is_meant], truth)),
         none_auroc(meant, is_meant),
         {
             str(kind): weighted_f1(truth[shapes.families == kind], said[shapes.families == kind])

@@ -7,6 +7,7 @@ from rich.console import Console
 
 from cli import options as opts
 from cli.dataset import shared
+from cli.progress import counted
 from training.labels import NONE
 
 
@@ -60,7 +61,7 @@ def _run(options: argparse.Namespace) -> int:
     counts = counts_of(options.multiple)
     if options.none:
         counts[NONE] = options.none
-    with shared.bar(Console(stderr=True)) as progress:
+    with counted(Console(stderr=True)) as progress:
         task = progress.add_task("performing", total=sum(counts.values()))
 
         def advance(more: int) -> None:

@@ -10,6 +10,7 @@ from rich.table import Table
 
 from cli import options as opts
 from cli.dataset import shared
+from cli.progress import counted
 from training.labels import CLASSES, PRIMITIVES
 
 if TYPE_CHECKING:
@@ -215,7 +216,7 @@ def _run(options: argparse.Namespace) -> int:
     table = Table("file", *CLASSES, "problems", box=None, padding=(0, 2, 0, 0))
     console = Console(stderr=True)
     taken = 0
-    with shared.bar(console) as progress:
+    with counted(console) as progress:
         for path in progress.track(options.files, description="reading"):
             try:
                 if options.from_flights:

@@ -10,6 +10,7 @@ from rich.console import Console
 from cli import options as opts
 from cli.dataset import shared
 from cli.link import linked
+from cli.progress import counted
 from common import messages as m
 from common.clock import SystemClock, nanoseconds
 from common.run import stop_on_signals
@@ -124,7 +125,7 @@ def _run(options: argparse.Namespace) -> int:
         if not arrived.full():
             arrived.put_nowait(payload)
 
-    with linked(options) as bus, shared.bar(console) as progress:
+    with linked(options) as bus, counted(console) as progress:
         stop = stop_on_signals()
         bus.subscribe(key_of(options.vehicle, "stick"), receive)
         console.print(HOW, highlight=False)

@@ -1,19 +1,10 @@
-"""What the subcommands share: types of options, the extra they need, a bar, problems as lines."""
+"""What the subcommands share: types of options, the extra they need, problems as lines."""
 
 import argparse
 import contextlib
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-)
 
 PROBLEMS_SHOWN = 20
 """Of each file; a wrong option makes every row of a file a problem."""
@@ -64,17 +55,6 @@ def add_people(parser: argparse.ArgumentParser, operator_help: str, *, required:
     )
     parser.add_argument(
         "--family", metavar="NAME", default="", help="what kind of person that is (none)"
-    )
-
-
-def bar(console: Console) -> Progress:
-    """A progress bar with counts and the time so far."""
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=console,
     )
 
 

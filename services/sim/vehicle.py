@@ -73,7 +73,8 @@ class StickNoise:
         noise, drift = self._limits
         white = self._generator.uniform(-noise, noise, (self._blocks, 4))
         steady = self._generator.uniform(-drift, drift, 4)
-        return (white + steady).tolist()  # type: ignore[no-any-return]
+        offsets: list[list[float]] = (white + steady).tolist()
+        return offsets
 
 
 class Vehicle:

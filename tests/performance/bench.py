@@ -179,6 +179,19 @@ def time_sticks(system: launch.System, count: int, progress: Progress) -> list[R
     ]
 
 
+def report(rows: list[Row], output: Path | None) -> None:
+    """Print the rows as a table, and write them as JSON if a file is given."""
+    table = Table("figure", "measured", "baseline", "ratio", "target")
+    for row in rows:
+        ratio = row.value / row.baseline
+        table.add_row(
+            row.figure, f"{row.value:.3f}", f"{row.baseline:g}", f"{ratio:.2f}", row.target
+        )
+    Console().print(table)
+    if output:
+        output.write_text(json.dumps([vars(row) for row in rows], indent=1))
+
+
 def main() -> None:
     """Run the bench and print its table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -200,15 +213,7 @@ def main() -> None:
             launch.wait_alive(system, meter.alive, others, threading.Event(), START_TIMEOUT_S)
             meter.node.close()
             rows += time_sticks(system, options.sticks, progress)
-    table = Table("figure", "measured", "baseline", "ratio", "target")
-    for row in rows:
-        ratio = row.value / row.baseline
-        table.add_row(
-            row.figure, f"{row.value:.3f}", f"{row.baseline:g}", f"{ratio:.2f}", row.target
-        )
-    Console().print(table)
-    if options.output:
-        options.output.write_text(json.dumps([vars(row) for row in rows], indent=1))
+    report(rows, options.output)
 
 
 if __name__ == "__main__":

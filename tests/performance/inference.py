@@ -11,6 +11,7 @@ import threading
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -169,17 +170,17 @@ def model_rows(model: OnnxModel, count: int) -> list[Row]:
         rows += [
             race(
                 f"intent of {samples} samples",
-                lambda c=core, n=now_ns: c.intent(n, n),  # type: ignore[misc]
+                partial(core.intent, now_ns, now_ns),
                 "its model alone",
-                lambda w=window: model.answer(w, 1.0),  # type: ignore[misc]
+                partial(model.answer, window, 1.0),
                 count,
                 IN_PROCESS_TARGET,
             ),
             race(
                 f"model, {samples} samples",
-                lambda w=window: model.answer(w, 1.0),  # type: ignore[misc]
+                partial(model.answer, window, 1.0),
                 "the thesis' network",
-                lambda w=window: plain(w),  # type: ignore[misc]
+                partial(plain, window),
                 count,
             ),
         ]
@@ -206,9 +207,9 @@ def bus_rows(path: Path, vehicle: str, count: int) -> list[Row]:
                 rows.append(
                     race(
                         f"question of {samples} samples through the router",
-                        lambda q=good: node.ask("classifier/classify", q),  # type: ignore[misc]
+                        partial(node.ask, "classifier/classify", good),
                         "a question refused",
-                        lambda q=bad: refused(node, q),  # type: ignore[misc]
+                        partial(refused, node, bad),
                         count,
                         ON_BUS_TARGET,
                     )

@@ -5,7 +5,6 @@ the median of its turns.
 """
 
 import argparse
-import json
 import os
 import threading
 from collections.abc import Callable
@@ -14,11 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import psutil
-from bench import Row, fly
+from bench import Row, fly, report
 from peers import PEER_HZ, PeerPhysics, egl_camera, tiny_camera
 from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
 from workers import Worker
 
 import worlds
@@ -366,15 +364,7 @@ def main() -> None:
     with Progress(console=Console(stderr=True)) as progress:
         for part in options.parts or PARTS:
             rows += PARTS[part](options, progress)
-    table = Table("figure", "measured", "baseline", "ratio", "target")
-    for row in rows:
-        ratio = row.value / row.baseline
-        table.add_row(
-            row.figure, f"{row.value:.3f}", f"{row.baseline:g}", f"{ratio:.2f}", row.target
-        )
-    Console().print(table)
-    if options.output:
-        options.output.write_text(json.dumps([vars(row) for row in rows], indent=1))
+    report(rows, options.output)
 
 
 if __name__ == "__main__":

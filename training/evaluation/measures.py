@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from training.labels import PRIMITIVES
+from training.scores import calibration_error, confidence_bins, f1_of
 
 IntArray = NDArray[np.int64]
 Array = NDArray[np.float64]
 
-BINS = 15
 ARC, SINE = PRIMITIVES.index("arc"), PRIMITIVES.index("sine")
 
 
@@ -43,9 +43,7 @@ class Tally:
     @property
     def f1(self) -> float:
         """F1 of the classes weighted by their sizes: 2 PR RC / (PR + RC), not eq. 5.1."""
-        right = np.diagonal(self.confusion)
-        was, said = self.confusion.sum(axis=1), self.confusion.sum(axis=0)
-        return float((2.0 * right / np.maximum(was + said, 1) * was).sum() / was.sum())
+        return float(f1_of(self.confusion))
 
     @property
     def arc_sine(self) -> float:
@@ -58,7 +56,7 @@ class Tally:
         """Expected calibration error: mean distance of confidence from accuracy."""
         if not len(self.bins):
             return None
-        return float(np.abs(self.bins[:, 1] - self.bins[:, 2]).sum() / self.bins[:, 0].sum())
+        return calibration_error(self.bins)
 
     def __add__(self, other: "Tally") -> "Tally":
         bins = self.bins + other.bins if len(self.bins) and len(other.bins) else self.bins[:0]
@@ -80,13 +78,7 @@ def tally(truth: IntArray, scores: Array, has_probabilities: bool) -> Tally:
     said = scores.argmax(axis=1)
     classes = len(PRIMITIVES)
     confusion = np.bincount(truth * classes + said, minlength=classes**2)
-    bins = np.zeros((0, 3))
-    if has_probabilities:
-        confidence, right = scores.max(axis=1), said == truth
-        index = np.minimum((confidence * BINS).astype(np.int64), BINS - 1)
-        bins = np.stack(
-            [np.bincount(index, w, BINS) for w in (np.ones(len(truth)), confidence, right)], axis=1
-        )
+    bins = confidence_bins(scores, truth) if has_probabilities else np.zeros((0, 3))
     return Tally(confusion.reshape(classes, classes), bins)
 
 

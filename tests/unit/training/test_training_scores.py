@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from sklearn.metrics import f1_score
 
-from training.scores import calibration_error, score, weighted_f1
+from training.scores import calibration_error, confidence_bins, score, weighted_f1
 
 
 def test_f1_is_that_of_a_library_not_eq_5_1() -> None:
@@ -30,5 +30,6 @@ def test_the_interval_is_over_people() -> None:
 def test_calibration_error_is_the_gap_between_confidence_and_accuracy() -> None:
     probabilities = np.tile([0.8, 0.2], (100, 1))
     truth = np.repeat([0, 1], 50)
-    assert calibration_error(probabilities, truth) == pytest.approx(0.3)
-    assert calibration_error(probabilities, np.repeat([0, 1], [80, 20])) == pytest.approx(0.0)
+    assert calibration_error(confidence_bins(probabilities, truth)) == pytest.approx(0.3)
+    truth = np.repeat([0, 1], [80, 20])
+    assert calibration_error(confidence_bins(probabilities, truth)) == pytest.approx(0.0)
