@@ -141,7 +141,7 @@ def draw(
     vx, vy = towards_axes(vx * ratio, vy / ratio, people.axis_pull[:, None])
     vx, vy = stepped(vx, vy, people.steps[:, None])
 
-    climb = np.where(flat, shapes.climb[:, None] * level, across)
+    climb = np.where(flat, shapes.climbing(progress) * level, across)
     late = time_s >= (people.late_s * rng.random(n))[:, None]
     climb = np.where(late, climb, 0.0) * (1.0 + 0.15 * wander(n, count, rng))
     climb += people.cross_talk[:, None] * vx * slow(n, count, 0.5, rng)

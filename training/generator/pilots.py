@@ -46,7 +46,7 @@ def path_m(shapes: Shapes, people: People, push: Array) -> Array:
     across = np.where(shapes.vertical[:, None], across * FULL_UP_MPS, across)
     x = np.where(shapes.vertical[:, None], along * np.cos(plane), along)
     y = np.where(shapes.vertical[:, None], along * np.sin(plane), across)
-    z = np.where(shapes.vertical[:, None], across, FULL_UP_MPS * shapes.climb[:, None] * step_m)
+    z = np.where(shapes.vertical[:, None], across, FULL_UP_MPS * shapes.climbing(progress) * step_m)
     steps = np.stack([x, y, z], axis=2)
     return np.asarray(np.cumsum(steps, axis=1) - steps[:, :1])
 

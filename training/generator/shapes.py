@@ -92,6 +92,10 @@ class Shapes:
             self.along_axis[:, None], np.sqrt((1.0 + swing) / (1.0 + self.slope[:, None] ** 2)), 1.0
         )
 
+    def climbing(self, progress: Array) -> Array:
+        """Vertical share (n, k or 1) of the horizontal speed at progress (n, k)."""
+        return self.climb[:, None]
+
     def _curved(self, progress: Array) -> Array:
         straight = self.straight[:, None]
         return np.maximum((progress - straight) / (1.0 - straight), 0.0)
