@@ -1,13 +1,12 @@
 """The chain in one process: cores stepped together on the simulator's time, as fast as they go.
 
-No network, no clock, no threads but the one that draws: what one core says, the others hear within
-the same step of physics, and the same seeds give the same flight. Messages all have `seq` 0 but
-sticks, which are numbered.
+No network, no clock, no threads: what one core says, the others hear within the same step of
+physics, and the same seeds give the same flight. Messages all have `seq` 0 but sticks, which are
+numbered.
 """
 
 from collections import defaultdict, deque
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Protocol
 
 from common import messages as m
@@ -18,11 +17,9 @@ from services.classifier.core import Classifier
 from services.localizer.core import Localizer
 from services.operator.pilot import Decision, Pilot
 from services.operator.sources import Deflection
-from services.sim.cameras import Shot, cameras_of
-from services.sim.config import Config as SimConfig
 from services.sim.core import PHYSICS_HZ, Simulation
-from services.sim.studio import open_renderer, photograph
 from services.synthesis.core import Synthesizer
+from studies.darkroom import Darkroom, Order
 
 CONTROL_HZ = 50
 """Sticks and steps of the autopilot."""
@@ -43,41 +40,6 @@ class Operator(Protocol):
     def answered(self, action: m.DecideAction, ok: bool) -> None:
         """What became of a decision."""
         ...
-
-
-class Darkroom:
-    """Draws what the simulator's cameras take, on a thread of its own while the flight goes on.
-
-    Args:
-        simulation: in whose present world pictures are taken; after a change of the world, `load`.
-        config: of its cameras and its renderer.
-
-    Raises:
-        NoOpenGlError: if OpenGL was asked for and there is none.
-    """
-
-    def __init__(self, simulation: Simulation, config: SimConfig) -> None:
-        self._simulation = simulation
-        self._quality = config.jpeg_quality
-        self._cameras = {camera.topic: camera for camera in cameras_of(config)}
-        # OpenGL belongs to the thread that opened it.
-        self._thread = ThreadPoolExecutor(1, "darkroom")
-        self._renderer = self._thread.submit(open_renderer, config.renderer).result()
-        self.load()
-
-    def load(self) -> None:
-        """Take pictures of the simulator's present world from now on."""
-        self._thread.submit(self._renderer.load, self._simulation.scene()).result()
-
-    def develop(self, shot: Shot) -> Future[m.Image]:
-        """The picture of a shot, when it is done."""
-        camera = self._cameras[shot.topic]
-        return self._thread.submit(photograph, self._renderer, camera, shot, self._quality)
-
-    def close(self) -> None:
-        """Free the renderer."""
-        self._thread.submit(self._renderer.close).result()
-        self._thread.shutdown()
 
 
 class Lockstep:
@@ -114,7 +76,7 @@ class Lockstep:
         self._darkroom = darkroom
         self._listeners: dict[str, list[Listener]] = defaultdict(list)
         self._commands: deque[m.Command] = deque()
-        self._pictures: deque[tuple[int, str, Future[m.Image]]] = deque()
+        self._pictures: deque[tuple[int, str, Order]] = deque()
         self._count = 0
         self._nonce = 0
         self._control_every = PHYSICS_HZ // CONTROL_HZ

@@ -23,7 +23,8 @@ from services.operator.pilot import Decision
 from services.operator.sources import Deflection
 from services.sim.config import Config as SimConfig
 from services.sim.core import Simulation
-from studies.lockstep import Darkroom, Lockstep
+from studies.darkroom import Darkroom
+from studies.lockstep import Lockstep
 from studies.metrics import Array, resample
 
 STEP_M = 0.05

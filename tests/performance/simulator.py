@@ -42,7 +42,8 @@ from services.sim.stage import Scene, Stage
 from services.sim.studio import open_renderer, photograph
 from services.synthesis.config import Config as SynthesisConfig
 from services.synthesis.core import Synthesizer
-from studies.lockstep import Darkroom, HandsOff, Lockstep
+from studies.darkroom import Darkroom
+from studies.lockstep import HandsOff, Lockstep
 
 TURNS = 15
 LAPS = 40
@@ -161,7 +162,6 @@ def chain(duration_s: float, progress: Progress) -> list[Row]:
 
 def localized(duration_s: float, progress: Progress) -> list[Row]:
     """Lock-step with both cameras' pictures, 640x360 and QVGA, and the localizer."""
-    with_all_cores()
     config = Config(world="track")
     simulation = Simulation(config)
     darkroom = Darkroom(simulation, config)
@@ -182,8 +182,10 @@ def localized(duration_s: float, progress: Progress) -> list[Row]:
 
     for topic in counts:
         lockstep.listen(topic, count(topic))
-    lockstep.run(1.0)
+    # Until all who draw have begun.
+    lockstep.run(5.0)
     lockstep.decide("takeoff")
+    counts.update(dict.fromkeys(counts, 0))
     task = progress.add_task("lock-step with pictures and localizer", total=1)
     clock = SystemClock()
     begin_ns = clock.monotonic_ns()

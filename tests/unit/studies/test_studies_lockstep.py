@@ -11,7 +11,8 @@ from services.operator.pilot import Decision
 from services.operator.sources import Deflection
 from services.sim.config import Config as SimConfig
 from services.sim.core import Simulation
-from studies.lockstep import Darkroom, HandsOff, Lockstep
+from studies.darkroom import Darkroom
+from studies.lockstep import HandsOff, Lockstep
 
 CONFIG = SimConfig(world="empty", down_fps=30.0)
 
