@@ -1,12 +1,16 @@
-"""How many steps are due: simulated time follows a real clock, catching up small lags."""
+"""How many steps are due: simulated time follows a real clock, and catches up what it lost."""
 
 from collections import deque
 
 from common.clock import NS_PER_S
 from services.sim.core import PHYSICS_HZ
 
-MAX_LAG_NS = NS_PER_S // 2
-"""A longer lag is given up: simulated time slips behind the clock."""
+AT_ONCE_NS = NS_PER_S // 2
+"""A lag up to this is caught up at once: nobody notices."""
+IN_TIME_NS = 10 * NS_PER_S
+"""A longer lag than this, such as a night of the laptop's, is given up: stamps stay behind."""
+HURRY = 10
+"""A lag between the two is caught up by one step in ten, so that sticks feel as they did."""
 _WINDOW_NS = 5 * NS_PER_S
 
 
@@ -14,17 +18,22 @@ class Pace:
     """Counts the steps due by a monotonic clock."""
 
     def __init__(self, now_ns: int) -> None:
-        self._begin_ns = now_ns
+        self._begin_ns = self._last_ns = now_ns
         self._steps = 0
-        self.slipped_ns = 0
+        self._behind_ns = 0
         self._history: deque[tuple[int, int]] = deque([(now_ns, 0)])
 
     def due(self, now_ns: int) -> int:
         """The steps to do now."""
+        caught_up_ns = min(self._behind_ns, (now_ns - self._last_ns) // HURRY)
+        self._behind_ns -= caught_up_ns
+        self._begin_ns -= caught_up_ns
+        self._last_ns = now_ns
         lag_ns = now_ns - self._begin_ns - self._steps * NS_PER_S // PHYSICS_HZ
-        if lag_ns > MAX_LAG_NS:
+        if lag_ns > AT_ONCE_NS:
             self._begin_ns += lag_ns
-            self.slipped_ns += lag_ns
+            if self._behind_ns + lag_ns <= IN_TIME_NS:
+                self._behind_ns += lag_ns
             lag_ns = 0
         steps = lag_ns * PHYSICS_HZ // NS_PER_S
         self.note(now_ns, steps)
