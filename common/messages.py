@@ -39,7 +39,10 @@ DecideAction = Literal["accept", "cancel", "takeoff", "land", "emergency"]
 PoseStatus = Literal["ok", "degraded", "lost"]
 VehicleState = Literal["landed", "taking_off", "flying", "landing", "emergency"]
 HealthState = Literal["ok", "degraded", "failed"]
-Plant = Literal["tum", "ardrone"]
+Plant = Annotated[
+    str,
+    Meta(min_length=1, max_length=32, description="`tum`, `ardrone`, or another kind of vehicle"),
+]
 
 
 def _require_finite(value: object, field: str) -> None:

@@ -13,8 +13,6 @@ WEIGHT_N = MASS_KG * GRAVITY_MPS2
 INERTIA_KGM2: Vector3 = (2.237568e-3, 2.985236e-3, 4.80374e-3)
 """About body x, y, z: the figures that public models of the AR.Drone 2.0 share (for 0.429 kg)."""
 HULL_M: Vector3 = (0.52, 0.52, 0.11)
-REST_HEIGHT_M = HULL_M[2] / 2.0
-"""Of the body's origin when it stands on the ground."""
 MAX_THRUST_N = 30.0 / 1.477 * MASS_KG
 """tum_simulator allows 30 N on 1.477 kg; this is the same acceleration."""
 DRAG_PER_S = 0.58
@@ -75,7 +73,7 @@ class Loads(msgspec.Struct, frozen=True, gc=False):
     Attributes:
         thrust_n: of the rotors, along body z.
         torque_nm: of the rotors, about the body's axes.
-        air_n: of the air on the hull, world.
+        air_n: of the air on the hull, or of the ground on wheels, world.
     """
 
     thrust_n: float

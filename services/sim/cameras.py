@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from common.camera import DOWN, FRONT, Lens, Mount
 from services.sim.body import Quaternion, Vector3
 from services.sim.config import Config, FrontLens, FrontSize
+from worlds import Body
 
 VIDEO_TOPICS = ("camera/front", "camera/down")
 
@@ -51,6 +52,15 @@ class Camera:
 
 
 @dataclass(frozen=True, slots=True)
+class Figure:
+    """A vehicle as others see it: its bodies in its own coordinates, and where it is."""
+
+    look: tuple[Body, ...]
+    position_m: Vector3
+    orientation: Quaternion
+
+
+@dataclass(frozen=True, slots=True)
 class Shot:
     """A picture to be taken: by which camera, when, and where the body is then.
 
@@ -61,6 +71,8 @@ class Shot:
         orientation: body to world, [x, y, z, w].
         velocity_mps: world.
         angular_velocity_radps: world.
+        vehicle: whose camera, 0 for the first.
+        others: the other vehicles, where the step left them in which the picture falls.
     """
 
     topic: str
@@ -69,6 +81,8 @@ class Shot:
     orientation: Quaternion
     velocity_mps: Vector3 = (0.0, 0.0, 0.0)
     angular_velocity_radps: Vector3 = (0.0, 0.0, 0.0)
+    vehicle: int = 0
+    others: tuple[Figure, ...] = ()
 
 
 def cameras_of(config: Config) -> tuple[Camera, Camera]:

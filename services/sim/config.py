@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import worlds
-from common.messages import Plant
-from services.sim.plants import PLANTS
+from services.sim import plants
+from services.sim.crew import crew_of
 
 FrontSize = Literal["360p", "480p", "720p"]
 FrontLens = Literal["tum", "ardrone", "measured"]
@@ -17,8 +17,10 @@ class Config:
 
     world: str = "track"
     """Where it starts: one of `autocomplete worlds`, or the path of a YAML file like those."""
-    plant: Plant = "tum"
-    """How the vehicle follows the stick."""
+    plant: str = "tum"
+    """What the vehicle is, and so how it follows the stick: the name of a file in `plants`."""
+    vehicles: str = "1"
+    """How many share the world; or a plant for each, as tum,ardrone,rover; NAME=PLANT names it."""
     seed: int = 0
     """Of all noise; the same seed and commands give the same flight."""
     clock: Literal["real", "lockstep"] = "real"
@@ -66,8 +68,14 @@ class Config:
             worlds.load(self.world)
         except worlds.WorldError as error:
             raise ValueError(f"world: {error}") from None
-        if self.plant not in PLANTS:
-            raise ValueError(f"plant: no {self.plant!r}; there are {', '.join(PLANTS)}")
+        try:
+            plants.load(self.plant)
+        except ValueError as error:
+            raise ValueError(f"plant: {error}") from None
+        try:
+            crew_of(self.vehicles, self.plant)
+        except ValueError as error:
+            raise ValueError(f"vehicles: {error}") from None
         if self.seed < 0:
             raise ValueError("seed: must be 0 or more")
         for name in ("command_noise", "sensor_noise", "picture_noise"):

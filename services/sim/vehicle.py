@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from common.messages import Command, VehicleState
+from common.messages import Command, CommandAction, VehicleState
 from common.topics import TOPICS
-from services.sim.body import WEIGHT_N, BodyState, Loads, Sticks, Vector3
-from services.sim.plants.plant import Plant
-from services.sim.stage import UNTOUCHED, Touch
+from services.sim.body import GRAVITY_MPS2, BodyState, Loads, Sticks, Vector3
+from services.sim.hull import UNTOUCHED, Touch
+from services.sim.plant import Plant
 
 WATCHDOG_S = TOPICS["command"].max_age_s
 """A command older than this is worthless: the vehicle hovers."""
@@ -23,8 +23,6 @@ STILL_MPS = 0.05
 COLLISION_GAP_S = 0.25
 """A contact is a new collision after this long without one: a scrape along a fence is one."""
 
-HOVER_LIFE_S = 12 * 60.0
-"""What the AR.Drone's maker states for one charge. A rotor's power grows as thrust^1.5."""
 BATTERY_LOW = 0.05
 """With less left it lands by itself and takes off no more; with nothing left the rotors stop."""
 
@@ -78,7 +76,7 @@ class StickNoise:
 
 
 class Vehicle:
-    """Turns commands into loads, step by step.
+    """Turns commands into loads, step by step: of what flies.
 
     Args:
         plant: how sticks become loads.
@@ -102,6 +100,8 @@ class Vehicle:
         self._noise = noise
         self._step_s = step_s
         self._ceiling_m = ceiling_m
+        self._weight_n = plant.build.mass_kg * GRAVITY_MPS2
+        self._drain = step_s / plant.life_s
         self._sticks = _NEUTRAL
         self._silence_s = 0.0
         self._apart_s = COLLISION_GAP_S
@@ -151,9 +151,13 @@ class Vehicle:
             loads = self._plant.take_off(state, wind_mps, below_m)
         else:
             loads = self._plant.land(state, wind_mps, below_m)
-        share = loads.thrust_n / WEIGHT_N
-        self.battery = max(0.0, self.battery - self._step_s / HOVER_LIFE_S * share * share**0.5)
+        self._spend(loads)
         return loads
+
+    def _spend(self, loads: Loads) -> None:
+        # A rotor's power grows as thrust^1.5.
+        share = loads.thrust_n / self._weight_n
+        self.battery = max(0.0, self.battery - self._drain * share * share**0.5)
 
     def _listen(self, command: Command | None, state: BodyState, touch: Touch) -> None:
         if command is None:
@@ -163,16 +167,18 @@ class Vehicle:
             return
         self._silence_s = 0.0
         self._sticks = Sticks(command.vx, command.vy, command.vz, command.wz)
-        if command.action == "fly":
-            return
-        if command.action == "emergency":
+        if command.action != "fly":
+            self._obey(command.action, state, touch)
+
+    def _obey(self, action: CommandAction, state: BodyState, touch: Touch) -> None:
+        if action == "emergency":
             self.state = "emergency"
-        elif command.action == "takeoff":
+        elif action == "takeoff":
             if self.state == "landed" and state.tilt_rad < 0.5 and self.battery > BATTERY_LOW:
                 self.state = "taking_off"
         elif self.state in ("taking_off", "flying"):
             self.state = "landing"
-        elif self.state == "emergency" and _lies_still(state, touch):
+        elif self.state == "emergency" and lies_still(state, touch):
             self.state = "landed"
 
     def _move_on(self, state: BodyState, touch: Touch, below_m: float) -> None:
@@ -190,8 +196,7 @@ class Vehicle:
             self.state = "flying"
 
     def _count_collisions(self, touch: Touch) -> None:
-        hit = (touch.body and self.state != "landed") or (touch.ground and self.state == "flying")
-        if not hit:
+        if not self._is_hit(touch):
             self._apart_s += self._step_s
             return
         if self._apart_s >= COLLISION_GAP_S:
@@ -199,7 +204,11 @@ class Vehicle:
             self.has_news = True
         self._apart_s = 0.0
 
+    def _is_hit(self, touch: Touch) -> bool:
+        return (touch.body and self.state != "landed") or (touch.ground and self.state == "flying")
 
-def _lies_still(state: BodyState, touch: Touch) -> bool:
+
+def lies_still(state: BodyState, touch: Touch) -> bool:
+    """Whether it is safe to touch: at rest, upright, on something."""
     speed = max(abs(each) for each in state.velocity_mps)
     return (touch.ground or touch.body) and speed < STILL_MPS and state.tilt_rad < 0.5

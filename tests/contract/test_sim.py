@@ -187,7 +187,7 @@ def test_reset_starts_anew_in_place_and_soon(sim: Process, client: Client) -> No
     ("request_", "field", "allowed"),
     [
         ({"world": "nowhere"}, "world", "track"),
-        ({"plant": "rover"}, "plant", "ardrone"),
+        ({"plant": "zeppelin"}, "plant", "ardrone"),
         ({"position": [0.0, 0.0, -5.0]}, "position", "0..100"),
         ({"position": [4.5, 4.2, 0.5], "world": "track"}, "position", "free"),
         ({"position": [0.0, 0.0]}, "position", ""),
@@ -250,7 +250,7 @@ def test_it_stops_without_a_router(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("flags", "named"),
-    [(["--plant", "rover"], "plant"), (["--world", "nowhere"], "world")],
+    [(["--plant", "zeppelin"], "plant"), (["--world", "nowhere"], "world")],
 )
 def test_a_wrong_flag_ends_it_with_one_line_that_names_it(flags: list[str], named: str) -> None:
     command = [str(Path(sys.executable).with_name("autocomplete")), "run", "sim", *flags]

@@ -1,10 +1,23 @@
-"""How vehicles follow the stick: one module a plant, chosen by its name."""
+"""The vehicles: one file each, which names its class `PLANT`; its own name is the file's."""
 
-from services.sim.plants.ardrone import ArdronePlant
-from services.sim.plants.plant import Plant
-from services.sim.plants.tum import TumPlant
+import importlib
+import pkgutil
 
-_PLANTS: tuple[type[Plant], ...] = (TumPlant, ArdronePlant)
+from services.sim.plant import Plant
 
-PLANTS = {plant.name: plant for plant in _PLANTS}
-"""Those that are built, by name."""
+
+def names() -> tuple[str, ...]:
+    """Those whose files are in this folder."""
+    return tuple(sorted(module.name for module in pkgutil.iter_modules(__path__)))
+
+
+def load(name: str) -> type[Plant]:
+    """A vehicle by its name.
+
+    Raises:
+        ValueError: if there is no such file; the text names those that there are.
+    """
+    if name not in names():
+        raise ValueError(f"no {name!r}; there are {', '.join(names())}")
+    plant: type[Plant] = importlib.import_module(f"{__name__}.{name}").PLANT
+    return plant

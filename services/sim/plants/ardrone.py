@@ -14,7 +14,6 @@ of 3.64 m/s. The other constants hold as they are.
 import math
 from typing import ClassVar
 
-from common.messages import Plant
 from common.sticks import FULL_STICK
 from services.sim.body import (
     DRAG_PER_S,
@@ -31,6 +30,7 @@ from services.sim.body import (
     Vector3,
     clip,
 )
+from services.sim.plant import Plant
 
 TILT_PER_S, TILT_RAD = 7.0, math.radians(24.0)
 """c3, c4."""
@@ -53,14 +53,13 @@ _FULL = FULL_STICK["ardrone"]
 _LIMIT = _FULL.linear_to
 
 
-class ArdronePlant:
+class ArdronePlant(Plant):
     """See the module; sticks are tilts in the heading frame.
 
     The driver leaves a trim error of a third of a degree: our choice, for an AR.Drone's hands-off
     wander with its optical hold switched off.
     """
 
-    name: ClassVar[Plant] = "ardrone"
     noise: ClassVar[float] = 0.0125
     drift: ClassVar[float] = 0.0125
 
@@ -141,3 +140,6 @@ def ground_effect(height_m: float) -> float:
     """How much more a rotor lifts at a height above ground (Cheeseman and Bennett, 1955)."""
     near = ROTOR_RADIUS_M / (4.0 * max(height_m, ROTOR_RADIUS_M / 2.0))
     return 1.0 / (1.0 - near * near)
+
+
+PLANT = ArdronePlant

@@ -8,7 +8,6 @@ knows no drag of its own; wind pushes it as hard as it pushes the `ardrone` plan
 import math
 from typing import ClassVar
 
-from common.messages import Plant
 from common.sticks import FULL_STICK
 from services.sim.body import (
     DRAG_PER_S,
@@ -23,6 +22,7 @@ from services.sim.body import (
     Vector3,
     clip,
 )
+from services.sim.plant import Plant
 
 _VELOCITY_P, _VELOCITY_D, _VELOCITY_LIMIT_MPS = 5.0, 1.0, 2.0
 _TILT_P, _TILT_D, _TILT_LIMIT_RAD = 10.0, 5.0, 0.5
@@ -36,10 +36,9 @@ _NEUTRAL = Sticks()
 _FULL = FULL_STICK["tum"]
 
 
-class TumPlant:
+class TumPlant(Plant):
     """See the module; sticks are speeds in the heading frame."""
 
-    name: ClassVar[Plant] = "tum"
     noise: ClassVar[float] = 0.05
     drift: ClassVar[float] = 0.03
 
@@ -112,3 +111,6 @@ class TumPlant:
         push = MASS_KG * DRAG_PER_S
         air = (push * wind_mps[0], push * wind_mps[1], push * wind_mps[2])
         return Loads(max(0.0, min(MAX_THRUST_N, thrust)), torque, air)
+
+
+PLANT = TumPlant

@@ -82,8 +82,6 @@ def seen_by_pybullet(world: World, shot: Shot) -> np.ndarray:
         view = pybullet.computeViewMatrix(eye, eye + turn[:, 0], turn[:, 2])
         upright = math.degrees(2.0 * math.atan(180.0 / LENS.intrinsics[1]))
         projection = pybullet.computeProjectionMatrixFOV(upright, 640 / 360, 0.05, 100.0)
-        # The vehicle itself would stand in the picture.
-        stage.place((0.0, 0.0, 80.0), 0.0)
         numbers = pybullet.getCameraImage(
             640,
             360,

@@ -30,7 +30,7 @@ def test_what_is_left_out_stays_as_it_was_set() -> None:
     ("request_", "field", "allowed"),
     [
         (ResetRequest(world="nowhere"), "world", "track"),
-        (ResetRequest(plant="rover"), "plant", "ardrone"),
+        (ResetRequest(plant="zeppelin"), "plant", "ardrone"),
         (ResetRequest(position=(0.0, 0.0, -1.0)), "position", "0..100 m"),
         (ResetRequest(position=(1e6, 0.0, 1.0)), "position", "1000 m"),
         (ResetRequest(position=(4.5, 4.2, 0.5)), "position", "free"),
@@ -54,7 +54,7 @@ def test_a_bad_request_is_refused_and_the_flight_goes_on(
 @pytest.mark.parametrize(
     "settings",
     [
-        {"plant": "rover"},
+        {"plant": "zeppelin"},
         {"world": "nowhere"},
         {"seed": -1},
         {"sensor_noise": -0.1},
