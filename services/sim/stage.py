@@ -8,14 +8,11 @@ import pybullet
 
 from services.sim.body import GRAVITY_MPS2, Vector3
 from services.sim.build import Build
-from services.sim.hull import KINDS, RESTITUTION, Hull, collision_shape
+from services.sim.hull import KINDS, RESTITUTION, Hull
+from services.sim.scenery import MOST, add_bodies
 from worlds import Body, Shape, Strip, Texture, World
 
 _FRICTION = 0.8
-_COMPOUND = 16
-"""Bodies in one of pybullet's: its most. It updates the bounds of each of its bodies at each step,
-so 164 of them cost 12 us a step, 11 compounds of them 1 us."""
-
 _SHAPES: dict[int, Shape] = {kind: shape for shape, kind in KINDS.items()}
 
 
@@ -48,10 +45,12 @@ class Stage:
         )
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, **on)
         self._ground = pybullet.createMultiBody(0.0, plane, **on)
-        self._groups = _neighbours(world.bodies)
-        self._compounds = [add_bodies(group, **on) for group in self._groups]
+        self._groups = [
+            world.bodies[begin : begin + MOST] for begin in range(0, len(world.bodies), MOST)
+        ]
+        self._scenery = [add_bodies(group, **on) for group in self._groups]
         self._bounds_m = _bounds_of(world.bodies)
-        for fixed in (self._ground, *self._compounds):
+        for fixed in (self._ground, *self._scenery):
             pybullet.changeDynamics(
                 fixed, -1, lateralFriction=_FRICTION, restitution=RESTITUTION, **on
             )
@@ -68,9 +67,7 @@ class Stage:
 
     def add(self, build: Build) -> Hull:
         """Put in another vehicle; it has to be placed."""
-        hull = Hull(
-            self._id, build, self._step_s, self._ground, tuple(self._compounds), self._away_m
-        )
+        hull = Hull(self._id, build, self._step_s, self._ground, tuple(self._scenery), self._away_m)
         self._hulls.append(hull)
         self._acquaint()
         return hull
@@ -112,8 +109,8 @@ class Stage:
     def scene(self) -> Scene:
         """What cameras see, read back from pybullet so that what is seen is what collides."""
         bodies: list[Body] = []
-        for compound, group in zip(self._compounds, self._groups, strict=True):
-            parts = pybullet.getCollisionShapeData(compound, -1, **self._on)
+        for number, group in zip(self._scenery, self._groups, strict=True):
+            parts = pybullet.getCollisionShapeData(number, -1, **self._on)
             for part, body in zip(parts, group, strict=True):
                 size = part[3]
                 if part[2] == pybullet.GEOM_CYLINDER:
@@ -124,14 +121,8 @@ class Stage:
         return Scene(tuple(bodies), self._world.strips, self._world.ground)
 
 
-def add_bodies(bodies: tuple[Body, ...], **on: int) -> int:
-    """Put bodies of a world as one into the pybullet that `on` names; returns its number there."""
-    # As a plain rigid body: as a multibody it would make a step dearer.
-    return int(pybullet.createMultiBody(0.0, collision_shape(bodies, **on), **on))
-
-
-def add_visible(body: Body, colour: tuple[float, ...], **on: int) -> None:
-    """Put what is seen of a body of a world into the pybullet that `on` names."""
+def add_visible(body: Body, colour: tuple[float, ...], **on: int) -> int:
+    """Put what is seen of a body into the pybullet that `on` names; its number there."""
     width, height = body.size_m[0], body.size_m[2]
     form: dict[str, Any]
     if body.shape == "box":
@@ -141,21 +132,7 @@ def add_visible(body: Body, colour: tuple[float, ...], **on: int) -> None:
     else:
         form = {"radius": width / 2.0}
     shape = pybullet.createVisualShape(KINDS[body.shape], rgbaColor=colour, **form, **on)
-    pybullet.createMultiBody(0.0, -1, shape, body.position_m, body.orientation, **on)
-
-
-def _neighbours(bodies: tuple[Body, ...]) -> list[tuple[Body, ...]]:
-    """The bodies in groups of at most _COMPOUND, each of what stands close together."""
-    if not bodies:
-        return []
-    if len(bodies) <= _COMPOUND:
-        return [bodies]
-    places = np.asarray([body.position_m for body in bodies])
-    axis = int(np.argmax(np.ptp(places, axis=0)))
-    order = np.argsort(places[:, axis], kind="stable")
-    half = len(bodies) // 2
-    near, far = (tuple(bodies[i] for i in part) for part in (order[:half], order[half:]))
-    return [*_neighbours(near), *_neighbours(far)]
+    return int(pybullet.createMultiBody(0.0, -1, shape, body.position_m, body.orientation, **on))
 
 
 def _bounds_of(bodies: tuple[Body, ...]) -> tuple[Any, Any]:
