@@ -17,15 +17,24 @@ if TYPE_CHECKING:
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
+    parser.description = (
+        "Trains every classifier on the same simulated people, asks it about people whom it has not"
+        " learned from, and writes tables and figures of all results in the folder. A result that"
+        " is there and not stale is not found again: an evaluation that was stopped goes on where"
+        " it was, and several with other --seeds may run side by side in one folder. A change of"
+        " the people, or of the code of a classifier, makes its results stale."
+    )
     parser.add_argument(
         "--out",
         metavar="FOLDER",
         type=Path,
-        help="where results and report go; results that are there are not found again"
-        " (evaluation, or evaluation-quick with --quick)",
+        help="where results and report go (evaluation, or evaluation-quick with --quick)",
     )
     parser.add_argument(
-        "--seeds", type=_seeds, metavar="0,1,...", help="of people and training (all five)"
+        "--seeds",
+        type=_seeds,
+        metavar="0,1,...",
+        help="of people and training, 0 to 4: each leaves other families out (all five)",
     )
     parser.add_argument(
         "--models", metavar="NAME,...", help="which classifiers, for example cnn-gru,svm (all)"
@@ -39,11 +48,21 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quick", action="store_true", help="few people and one seed, to see that it works"
     )
+    parser.add_argument(
+        "--report", action="store_true", help="train nothing: report the results that are there"
+    )
+    parser.add_argument(
+        "--docs",
+        metavar="FILE.md",
+        type=opts.existing_file,
+        help="also renew the tables and figures at the end of this page",
+    )
     opts.add_examples(
         parser,
-        "autocomplete evaluate                       # everything; begun again, it goes on",
+        "autocomplete evaluate                       # everything: hours",
         "autocomplete evaluate --quick               # minutes; its figures mean nothing",
         "autocomplete evaluate --models 'cnn-gru,geometry + ExtraTrees' --seeds 0,1",
+        "autocomplete evaluate --report --docs docs/evaluation.md",
     )
     parser.set_defaults(action=_run)
 
@@ -85,13 +104,21 @@ def _run(options: argparse.Namespace) -> int:
         unknown = [name for name in models if name not in CONTENDERS]
         if unknown:
             raise ValueError(f"--models {unknown[0]!r}: use {', '.join(CONTENDERS)}")
+    seeds: tuple[int, ...] = options.seeds or (ALL_SEEDS[:1] if options.quick else ALL_SEEDS)
+    if not set(seeds) <= set(ALL_SEEDS):
+        raise ValueError(f"--seeds {max(seeds)}: use {ALL_SEEDS[0]} to {ALL_SEEDS[-1]}")
+    if options.docs is not None and options.quick:
+        raise ValueError("--docs: figures of a quick run mean nothing; leave --quick out")
+    if options.report:
+        models, options.people = (), False
     out: Path = options.out or Path("evaluation-quick" if options.quick else "evaluation")
     order = Order(
         out=out,
-        seeds=options.seeds or (ALL_SEEDS[:1] if options.quick else ALL_SEEDS),
+        seeds=seeds,
         models=models,
         size="quick" if options.quick else "full",
         people=options.people,
+        page=options.docs,
     )
     console = Console()
     with counted(console) as progress:

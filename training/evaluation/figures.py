@@ -24,10 +24,14 @@ from training.generator.dataset import THESIS as THESIS_PEOPLE
 from training.generator.dataset import counts_of, populate
 from training.labels import PRIMITIVES
 
-COLOURS = ("#000000", "#e69f00", "#56b4e9", "#009e73", "#cc79a7", "#0072b2", "#d55e00", "#999999")
-"""Okabe and Ito's, told apart by colour-blind eyes; ours is black and bold."""
-MARKS = ("o", "s", "^", "v", "D", "P", "X", "*")
+COLOURS = (
+    "#000000", "#e69f00", "#56b4e9", "#009e73", "#cc79a7", "#0072b2", "#d55e00", "#999999",
+    "#f0e442",
+)  # fmt: skip
+"""Okabe and Ito's and grey, told apart by colour-blind eyes; ours is black and bold."""
+MARKS = ("o", "s", "^", "v", "D", "P", "X", "*", "h")
 DPI = 110
+PICTURE_OF_BARS = "bars.png"
 LENGTHS_OF = 40
 """So many people's primitives are drawn by their lengths."""
 
@@ -94,6 +98,40 @@ def _early(results: Results, path: Path) -> str:
     return (
         f"Weighted F1 so long after a motion began, mean over seeds (left, n = {count} primitives"
         " in all) and over families (right); shaded: 95 % interval of ours."
+    )
+
+
+def _answered(results: Results, path: Path) -> str:
+    """Beside the early curve: what of it flies."""
+    figure, panels = plt.subplots(1, 2, figsize=(9.6, 3.8), sharey=True)
+    at = np.arange(len(MOMENTS))
+    for people, title, style in (
+        (CALIBRATED, "calibrated", "-"),
+        (FAMILY, "family left out", "--"),
+    ):
+        found = [results.answered(people, moment) for moment in MOMENTS]
+        for part, (text, colour) in enumerate(
+            (("answered", "#0072b2"), ("right when answered", "#009e73"))
+        ):
+            means = [100.0 * pair[part].mean for pair in found]
+            panels[0].plot(at, means, style, color=colour, marker="o", label=f"{title}: {text}")
+    first = next(iter(results.judged[OURS].values()))
+    for kind, colour, mark in zip(first["none"], COLOURS, MARKS, strict=False):
+        means = [100.0 * results.nothing(kind, moment, "answered").mean for moment in MOMENTS]
+        panels[1].plot(at, means, color=colour, marker=mark, label=kind)
+    panels[0].set_title("the four", fontsize=11)
+    panels[1].set_title("nothing: answered all the same", fontsize=11)
+    panels[0].set_ylabel("% of windows")
+    for panel in panels:
+        panel.set_xticks(at, list(MOMENTS))
+        panel.set_xlabel("time since the motion began")
+        panel.set_ylim(-2.0, 102.0)
+        panel.legend(fontsize=9, frameon=False)
+        _clean(panel)
+    _save(figure, path)
+    return (
+        "What flies: how many windows are answered with the threshold that flies, and how many of"
+        " these answers are right; ours, mean over seeds, or over families left out."
     )
 
 
@@ -259,9 +297,11 @@ def draw(results: Results, table: Table, out: Path) -> list[Drawn]:
     """Draw what there are results for; (file name, caption) of each figure."""
     wanted: list[tuple[str, Callable[[Path], str]]] = []
     if table.rows:
-        wanted.append(("bars.png", lambda path: _picture(table, path)))
+        wanted.append((PICTURE_OF_BARS, lambda path: _picture(table, path)))
     if results.judged:
         wanted.append(("early.png", lambda path: _early(results, path)))
+        if OURS in results.models:
+            wanted.append(("answered.png", lambda path: _answered(results, path)))
         wanted.append(("families.png", lambda path: _families(results, path)))
         wanted.append(("lengths.png", _lengths))
     if OURS in results.models:

@@ -5,7 +5,6 @@ Of the wide population some families are left out of each seed's training altoge
 scores as in the thesis, is in training too, by people who are not judged on.
 """
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,6 +17,7 @@ from training.evaluation.contender import Lesson
 from training.evaluation.names import CALIBRATED, FAMILY, KNOWN
 from training.fit import EVALUATION
 from training.generator.dataset import THESIS, Population, counts_of, populate
+from training.generator.nothing import KINDS
 from training.generator.people import FAMILIES
 from training.labels import NONE
 from training.windows import Windows, examples_of, padded, random_tracks
@@ -35,7 +35,8 @@ class Size:
         wide: of the wide population, to learn from; a sixth as many to choose by.
         thesis: of the calibrated one, likewise.
         none: performances of nothing, as a share of those of primitives.
-        tested: of each population that is judged on; a third as many of each family left out.
+        tested: of each population that is judged on; of each family left out half as many people,
+            and a third as many performances.
         hovering_people: who hold a place for 60 s.
         budget: windows that our network is shown in all.
     """
@@ -67,13 +68,13 @@ class Fold:
         lesson: what to learn from.
         tests: performances to judge on by name: `calibrated`, `known` (wide population, families
             learned from) and `family <name>` for each family left out.
-        none: performances of nothing by people who are not learned from.
+        none: performances of nothing by kind, of people who are not learned from.
     """
 
     seed: int
     lesson: Lesson
     tests: dict[str, list[Primitive]]
-    none: list[Primitive]
+    none: dict[str, list[Primitive]]
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -131,21 +132,30 @@ def fold(seed: int, size: Size, tell: Callable[[int, int], None]) -> Fold:
         return primitives
 
     share = VALIDATION_SHARE
-    choosing = round(size.wide_people * share), round(size.thesis_people * part * share)
     training = made("t", size.wide_people, size.wide, wide, size.none)
     training += made("c", round(size.thesis_people * part), size.thesis * part, thesis)
     validation = made(
         "v", max(8, round(size.wide_people * share)), size.wide * share, wide, size.none
     )
-    validation += made("w", choosing[1], size.thesis * part * share, thesis)
+    validation += made(
+        "w", round(size.thesis_people * part * share), size.thesis * part * share, thesis
+    )
     tests = {CALIBRATED: made("k", round(size.tested_people * part), size.tested * part, thesis)}
     tests[KNOWN] = made("o", size.tested_people, size.tested, wide)
     for family in out:
         tests[FAMILY + family.name] = made(
             "f", size.tested_people // 2, size.tested / 3, Population("wide", (family,))
         )
-    nothing = {NONE: len(tests[KNOWN])}
-    none = populate(Population("wide", FAMILIES), size.tested_people, nothing, next(seeds))
+    own_seeds = np.random.SeedSequence(next(seeds)).generate_state(len(KINDS))
+    none = {
+        kind: populate(
+            Population("wide", FAMILIES, nothing={kind: 1.0}),
+            size.tested_people,
+            {NONE: max(1, round(kind_share * len(tests[KNOWN])))},
+            int(own),
+        )
+        for (kind, kind_share), own in zip(KINDS.items(), own_seeds, strict=True)
+    }
     tell(total, total)
     lesson = Lesson(
         training,
@@ -156,12 +166,3 @@ def fold(seed: int, size: Size, tell: Callable[[int, int], None]) -> Fold:
         size.budget,
     )
     return Fold(seed, lesson, tests, none)
-
-
-def fingerprint(size: Size) -> str:
-    """Names the people of all folds: a changed generator or size gives another one."""
-    digest = hashlib.sha256(repr(size).encode())
-    for population in (THESIS, Population("wide", FAMILIES)):
-        for one in populate(population, len(population.families), {**counts_of(0.01), NONE: 6}, 0):
-            digest.update(one.family.encode() + one.times_s.tobytes() + one.sticks.tobytes())
-    return digest.hexdigest()[:16]

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from common.clock import nanoseconds
+from common.clock import nanoseconds, seconds
 from common.messages import NONE_LABEL, Pose, Stick, Suggestion
+from common.topics import TOPICS
 from services.classifier.config import Config as ClassifierConfig
 from services.classifier.core import Classifier
 from services.classifier.model import Model
@@ -39,6 +40,8 @@ class Bothered:
         asked: intents.
         intents: those that are not `none`.
         suggestions: those of them that synthesis made a path of.
+        different: of these, how many had a number of their own: arrows that came or jumped.
+        shown_s: so long there were arrows on the screen, of all people together.
         bothered: people who got a suggestion.
     """
 
@@ -46,6 +49,8 @@ class Bothered:
     asked: int
     intents: int
     suggestions: int
+    different: int
+    shown_s: float
     bothered: int
 
 
@@ -57,13 +62,15 @@ def bothered(model: Model, holds: Sequence[tuple[Primitive, Array]], period_s: f
         holds: of each person the sticks, and x y z in m and yaw in rad (N, 4) every `STEP_S`.
         period_s: T.
     """
-    asked, intents, suggestions, people = 0, 0, 0, 0
+    asked, intents, suggestions, different, people = 0, 0, 0, 0, 0
+    shown_s = 0.0
     period_ns = nanoseconds(period_s)
     for hold, places in holds:
         classifier = Classifier(ClassifierConfig(), model)
         synthesizer = Synthesizer(SynthesisConfig())
         poses = _poses(places)
-        flown, due_ns, before = 0, period_ns, suggestions
+        flown, due_ns = 0, period_ns
+        given: list[tuple[int, int]] = []
         for seq, (time_s, stick) in enumerate(
             zip(hold.times_s.tolist(), hold.sticks.tolist(), strict=True)
         ):
@@ -75,11 +82,26 @@ def bothered(model: Model, holds: Sequence[tuple[Primitive, Array]], period_s: f
                 intent = classifier.intent(due_ns, due_ns)
                 asked += 1
                 intents += intent.label != NONE_LABEL
-                suggestions += isinstance(synthesizer.on_intent(intent, due_ns), Suggestion)
+                suggestion = synthesizer.on_intent(intent, due_ns)
+                if isinstance(suggestion, Suggestion):
+                    given.append((suggestion.id, due_ns))
                 due_ns += period_ns
             classifier.on_stick(_stick(now_ns, seq, *stick), now_ns)
-        people += suggestions > before
-    return Bothered(len(holds), asked, intents, suggestions, people)
+        suggestions += len(given)
+        different += len({number for number, _ in given})
+        shown_s += shown([due_ns for _, due_ns in given], hold.times_s[-1])
+        people += bool(given)
+    return Bothered(len(holds), asked, intents, suggestions, different, shown_s, people)
+
+
+def shown(given_ns: Sequence[int], end_s: float) -> float:
+    """For how many s, until `end_s`, suggestions that came at these times are on the screen."""
+    total_s, until_s = 0.0, 0.0
+    for at_ns in given_ns:
+        begin_s = max(seconds(at_ns), until_s)
+        until_s = min(seconds(at_ns) + TOPICS["suggestion"].max_age_s, end_s)
+        total_s += max(0.0, until_s - begin_s)
+    return total_s
 
 
 def _poses(places: Array) -> list[Pose]:

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sklearn.metrics import roc_auc_score
 
 from common.clock import Clock, seconds
 from services.classifier.model import OnnxModel
@@ -17,12 +16,13 @@ from training.evaluation.hover import HOLD_S, bothered
 from training.evaluation.measures import tally
 from training.evaluation.names import CALIBRATED, KNOWN, MOMENTS, WHOLE
 from training.evaluation.ours import Ours
+from training.evaluation.rejection import rejection
 from training.finetune import adaptation_study
 from training.generator.dataset import holds
 from training.windows import examples_of, seen_after
 
 PERIODS_S = (1.0, 0.1)
-"""The shortest and the longest T of the service."""
+"""The longest and the shortest T of the service."""
 
 ADAPTED = 4
 """So many people a seed show five performances of each primitive of their own."""
@@ -41,13 +41,7 @@ def _asked(contender: Contender, primitives: Sequence[Primitive], moment: str) -
 
 
 def judge(
-    contender: Contender,
-    fold: Fold,
-    seed: int,
-    hovering_people: int,
-    clock: Clock,
-    model_path: Path,
-    report: Report,
+    contender: Contender, fold: Fold, seed: int, clock: Clock, report: Report
 ) -> dict[str, Any]:
     """Train and ask; the counts of every set of people at every moment.
 
@@ -55,9 +49,7 @@ def judge(
         contender: fresh.
         fold: people.
         seed: of the training.
-        hovering_people: how many hold a place for 60 s (our network only).
         clock: to measure how long it takes.
-        model_path: where our network is exported to.
         report: told what is done, and how many steps of how many.
     """
     begin_ns = clock.monotonic_ns()
@@ -86,33 +78,19 @@ def judge(
     if history:
         result["history"] = history
     if isinstance(contender, Ours):
-        result |= _of_ours(contender, fold, seed, hovering_people, model_path)
+        epochs = contender.fitted.history
+        result["history"] = [(epoch.training_loss, epoch.validation_loss) for epoch in epochs]
+        result |= rejection(contender, fold)
     report(f"{contender.name}: is asked", total, total)
     return result
 
 
-def _of_ours(
-    ours: Ours, fold: Fold, seed: int, hovering_people: int, model_path: Path
-) -> dict[str, Any]:
-    """What only a classifier with a rejection can be asked."""
-    meant: dict[str, list[float]] = {}
-    for moment, after in MOMENTS.items():
-        for kind, people in (("four", fold.tests[KNOWN]), ("none", fold.none)):
-            found = ours.meant(seen_after(examples_of(people), after)).tolist()
-            meant.setdefault(kind, []).extend(found)
-            meant[f"{kind} {moment}"] = found
-    ours.export(model_path)
+def hovered(model_path: Path, seed: int, people: int) -> dict[str, Any]:
+    """What people who only hold a place are bothered with, by period T in s."""
     model = OnnxModel(model_path)
     hold_seed = int(np.random.SeedSequence((seed, 9)).generate_state(1)[0])
-    held = holds(hovering_people, HOLD_S, hold_seed)
-    return {
-        "history": [(epoch.training_loss, epoch.validation_loss) for epoch in ours.fitted.history],
-        "none": {
-            moment: _auroc(meant[f"four{moment}"], meant[f"none{moment}"])
-            for moment in ("", *(f" {name}" for name in MOMENTS))
-        },
-        "hover": {str(period_s): vars(bothered(model, held, period_s)) for period_s in PERIODS_S},
-    }
+    held = holds(people, HOLD_S, hold_seed)
+    return {str(period_s): vars(bothered(model, held, period_s)) for period_s in PERIODS_S}
 
 
 def adapted(ours: Ours, fold: Fold, seed: int) -> list[dict[str, Any]]:
@@ -128,9 +106,3 @@ def adapted(ours: Ours, fold: Fold, seed: int) -> list[dict[str, Any]]:
         candidates=3 * ADAPTED,
     )
     return [vars(person) for person in study]
-
-
-def _auroc(four: list[float], none: list[float]) -> dict[str, float]:
-    """How well the four are told from nothing: area under the curve, and how many windows."""
-    truth = [1] * len(four) + [0] * len(none)
-    return {"auroc": float(roc_auc_score(truth, four + none)), "n": len(truth)}

@@ -28,7 +28,7 @@ class Latency:
 
 
 def latency(model: Model, clock: Clock, count: int) -> Latency:
-    """Ask a model `count` times about windows of 4 s."""
+    """Ask a model `count` times about the longest windows."""
     rng = np.random.default_rng(0)
     windows = rng.uniform(-1.0, 1.0, (32, WINDOW_SAMPLES, 4)).astype(np.float32)
     taken = []

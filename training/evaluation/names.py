@@ -3,6 +3,7 @@
 OURS = "cnn-gru"
 """The project's own network."""
 THESIS = "cnn-gru-thesis"
+LITE = "LITE"
 CALIBRATED = "calibrated"
 """People on whom the thesis' machine scores as in the thesis; held out."""
 KNOWN = "known"
@@ -18,3 +19,5 @@ MOMENTS: dict[str, float | None] = {
     WHOLE: None,
 }
 """When a classifier is asked: so long after the motion began, and at its end."""
+EVERYTHING = "all"
+"""All moments, or all kinds of nothing, together."""

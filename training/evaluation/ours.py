@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from training.evaluation.contender import Lesson, Scores, Tell
 from training.evaluation.names import OURS
-from training.export import export
+from training.export import export, load, save
 from training.fit import Budget, Fitted, fit_network
 from training.labels import PRIMITIVES
 from training.windows import Windows
@@ -30,10 +30,25 @@ class Ours:
         """Calibrated probabilities."""
         return np.asarray(self.fitted.probabilities(windows), dtype=np.float64)
 
-    def meant(self, windows: Windows) -> NDArray[np.float64]:
-        """How likely it is (n,) that any primitive is meant."""
-        return np.asarray(self.fitted.meant(windows), dtype=np.float64)
+    def asked(self, windows: Windows) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Calibrated probabilities (n, 4), and how likely it is (n,) that any is meant."""
+        return self.fitted.answers(windows)
 
-    def export(self, path: Path) -> None:
-        """Write the model file that a service would load."""
+    def sure(
+        self, probabilities: NDArray[np.float32], meant: NDArray[np.float32]
+    ) -> NDArray[np.bool_]:
+        """Which (n,) of these answers a service would give, with the model's own threshold."""
+        return np.asarray(meant * probabilities.max(axis=1) >= self.fitted.confidence_min)
+
+    def save(self, path: Path) -> None:
+        """Write the model file that a service would load, and the weights beside it."""
         export(self.fitted, PRIMITIVES, path.stem, path)
+        save(self.fitted, path.with_suffix(".pt"))
+
+    def load(self, path: Path) -> None:
+        """Take the weights beside a model file, without their history.
+
+        Raises:
+            OSError: if there are none, or they are another network's.
+        """
+        self.fitted = load(path.with_suffix(".pt"))

@@ -1,17 +1,27 @@
 """The report: tables of everything, as Markdown, HTML and a picture, with its figures."""
 
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
 from training.evaluation.bars import bars, calibration, points_lost
 from training.evaluation.distortions import UNCHANGED
-from training.evaluation.figures import draw
+from training.evaluation.figures import PICTURE_OF_BARS, Drawn, draw
 from training.evaluation.human import HUMAN_SETS
 from training.evaluation.measures import Tally, estimate
-from training.evaluation.names import CALIBRATED, FAMILY, KNOWN, MOMENTS, WHOLE
+from training.evaluation.names import (
+    CALIBRATED,
+    EVERYTHING,
+    FAMILY,
+    KNOWN,
+    MOMENTS,
+    OURS,
+    WHOLE,
+)
 from training.evaluation.results import Results
 from training.evaluation.tables import Table
 
+BEGIN = "<!-- made by 'autocomplete evaluate --docs': what follows is not to be edited -->"
 STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:75em;margin:2em auto;padding:0 1em}
 table{border-collapse:collapse}
 td,th{padding:.25em .8em;border-bottom:1px solid #ddd;text-align:left}
@@ -116,6 +126,46 @@ def _early(results: Results) -> Table:
     )
 
 
+def _flown(results: Results) -> Table:
+    """What the early table leaves out: only sure answers fly."""
+    rows = []
+    for people, text in ((CALIBRATED, "calibrated"), (FAMILY, "family left out")):
+        found = [results.answered(people, moment) for moment in MOMENTS]
+        rows.append((f"{text}: answered", *(some.text(1, 100) for some, _ in found)))
+        rows.append((f"{text}: right when answered", *(right.text(1, 100) for _, right in found)))
+    first = next(iter(results.judged[OURS].values()))
+    for kind in first["none"]:
+        shares = (results.nothing(kind, moment, "answered") for moment in MOMENTS)
+        rows.append((f"nothing, {kind}: answered", *(share.text(1, 100) for share in shares)))
+    return Table(
+        "What flies: only answers that are sure enough",
+        f"Ours, % of windows, with the threshold of each seed's model. {_numbers(results)},"
+        " or over families. Whatever is answered to nothing is wrong. In flight most rests and"
+        " turns on the spot never reach the model: nothing has moved yet.",
+        ("windows", *MOMENTS),
+        tuple(rows),
+    )
+
+
+def _nothing(results: Results) -> Table:
+    first = next(iter(results.judged[OURS].values()))["none"]
+    rows = tuple(
+        (
+            kind,
+            f"{moments[WHOLE]['n']:.0f}",
+            *(results.nothing(kind, moment, "auroc").text() for moment in (*MOMENTS, EVERYTHING)),
+        )
+        for kind, moments in first.items()
+    )
+    return Table(
+        "None against the four",
+        "Area under the curve of `meant`, ours, against primitives of as many seconds by people of"
+        f" families that are known. n: performances of nothing a seed. {_numbers(results)}.",
+        ("kind of nothing", "n", *MOMENTS, "all moments"),
+        rows,
+    )
+
+
 def _robust(results: Results) -> Table:
     first = next(iter(next(iter(results.judged.values())).values()))
     names = tuple(name for name in first["distorted"] if name != UNCHANGED)
@@ -180,27 +230,49 @@ def tables_of(results: Results) -> list[Table]:
     """Every table there are results for."""
     tables = [_bars(results)]
     if results.judged:
-        tables += [_classifiers(results), _early(results), _robust(results)]
+        tables.append(_classifiers(results))
         if results.families:
-            tables.insert(2, _families(results))
+            tables.append(_families(results))
+        tables.append(_early(results))
+        if OURS in results.models:
+            tables += [_flown(results), _nothing(results)]
+        tables.append(_robust(results))
     if results.human:
         tables.append(_human(results))
     return tables
 
 
-def write(results: Results, out: Path) -> list[Table]:
-    """Write report.md, report.html and all figures into a folder; returns the tables."""
+def write(results: Results, out: Path, page: Path | None = None) -> list[Table]:
+    """Write report.md, report.html and all figures into a folder.
+
+    Args:
+        results: to report.
+        out: the folder.
+        page: a page of text whose end, after the line `BEGIN`, becomes these tables and figures.
+
+    Returns:
+        The tables.
+
+    Raises:
+        ValueError: if the page lacks that line.
+    """
     out.mkdir(parents=True, exist_ok=True)
     tables = tables_of(results)
     figures = draw(results, tables[0], out)
-    text = "\n".join(table.markdown() for table in tables)
-    pictures = "\n".join(f"![{caption}]({name})\n\n{caption}\n" for name, caption in figures)
-    (out / "report.md").write_text(f"# Evaluation\n\n{text}\n## Figures\n\n{pictures}")
-    (out / "report.html").write_text(_page(tables, figures))
+    (out / "report.md").write_text(f"# Evaluation\n\n{_markdown(tables, figures)}")
+    (out / "report.html").write_text(_html(tables, figures))
+    if page is not None:
+        _renew(page, tables, figures, out)
     return tables
 
 
-def _page(tables: Sequence[Table], figures: Sequence[tuple[str, str]]) -> str:
+def _markdown(tables: Sequence[Table], figures: Sequence[Drawn]) -> str:
+    text = "\n".join(table.markdown() for table in tables)
+    pictures = "\n".join(f"![{caption}]({name})\n\n{caption}\n" for name, caption in figures)
+    return f"{text}\n## Figures\n\n{pictures}"
+
+
+def _html(tables: Sequence[Table], figures: Sequence[Drawn]) -> str:
     body = "".join(table.html() for table in tables)
     pictures = "".join(
         f'<figure><img src="{name}" alt=""><figcaption>{caption}</figcaption></figure>'
@@ -210,3 +282,19 @@ def _page(tables: Sequence[Table], figures: Sequence[tuple[str, str]]) -> str:
         '<!doctype html><html lang="en"><meta charset="utf-8"><title>Evaluation</title>'
         f"<style>{STYLE}</style><h1>Evaluation</h1>{body}<h2>Figures</h2>{pictures}</html>\n"
     )
+
+
+def _renew(page: Path, tables: Sequence[Table], figures: Sequence[Drawn], out: Path) -> None:
+    """Write the end of a page; its figures go to `figures/` beside it, named for the page."""
+    before, begin, _ = page.read_text().partition(BEGIN)
+    if not begin:
+        raise ValueError(f"{page} lacks the line {BEGIN!r}; put it where tables and figures go")
+    folder = page.parent / "figures"
+    folder.mkdir(exist_ok=True)
+    shown = []
+    for name, caption in figures:
+        if name != PICTURE_OF_BARS:  # the page has them as a table
+            copied = folder / f"{page.stem}-{name}"
+            shutil.copyfile(out / name, copied)
+            shown.append((f"figures/{copied.name}", caption))
+    page.write_text(f"{before}{BEGIN}\n\n{_markdown(tables, shown)}")

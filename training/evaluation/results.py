@@ -86,6 +86,28 @@ class Results:
             for model in self.models
         )
 
+    def answered(self, people: str, moment: str) -> tuple[Estimate, Estimate]:
+        """Of ours, the share of windows that are answered, and of those the share that is right.
+
+        Args:
+            people: calibrated ones (over seeds) or families left out (each is one value).
+            moment: when.
+        """
+        counts = [
+            asked[moment]
+            for result in self.judged[OURS].values()
+            for name, asked in result["answered"].items()
+            if name.startswith(people)
+        ]
+        return (
+            estimate(some / windows for windows, some, _ in counts),
+            estimate(right / some for _, some, right in counts if some),
+        )
+
+    def nothing(self, kind: str, moment: str, figure: str) -> Estimate:
+        """Of ours, `auroc` or `answered` of a kind of nothing at a moment, over seeds."""
+        return self.each(OURS, lambda result: result["none"][kind][moment][figure])
+
     def each(self, model: str, of: Callable[[dict[str, Any]], float]) -> Estimate:
         """Anything of a classifier's results, over seeds."""
         return estimate(of(result) for result in self.judged[model].values())

@@ -1,7 +1,7 @@
 """Sets of labelled sticks by simulated people: the wide population, and the thesis' own."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,7 @@ class Population:
             scatter of shapes.
         compass_share: those who set out in one of eight directions.
         yaws: whether anybody touches the yaw axis.
+        nothing: how often each kind of nothing is done; together 1.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Population:
     difficulty: float = 1.0
     compass_share: float = COMPASS_SHARE
     yaws: bool = True
+    nothing: Mapping[str, float] = field(default_factory=lambda: nothing.KINDS)
 
 
 THESIS_DIFFICULTY = 2.0
@@ -153,7 +155,7 @@ def attempt(
     used = np.array([1.0, 1.0, 1.0, float(population.yaws)])
     offset = worn_offset(people, rng) * used
     if label == NONE:
-        sticks, samples, good = _nothing(people, offset, rng)
+        sticks, samples, good = _nothing(people, offset, population.nothing, rng)
         sticks *= used
     else:
         shapes = ask(label, people, style, rng, population.difficulty, population.compass_share)
@@ -176,7 +178,7 @@ def _flown_m(sticks: Array, offset: Array, people: People) -> Array:
 
 
 def _nothing(
-    people: People, offset: Array, rng: np.random.Generator
+    people: People, offset: Array, shares: Mapping[str, float], rng: np.random.Generator
 ) -> tuple[Array, IntArray, NDArray[np.bool_]]:
     """Sticks without a primitive in them, samples of each, and whether an observer agrees."""
     n = len(people)
@@ -184,8 +186,9 @@ def _nothing(
     samples = np.round(duration_s / STEP_S).astype(np.int64)
     count = int(samples.max())
     sticks = np.zeros((n, count, 4))
-    kinds = rng.choice(len(nothing.KINDS), n, p=list(nothing.KINDS.values()))
-    for kind, name in enumerate(nothing.KINDS):
+    names = list(shares)
+    kinds = rng.choice(len(names), n, p=list(shares.values()))
+    for kind, name in enumerate(names):
         rows = np.flatnonzero(kinds == kind)
         if len(rows) == 0:
             continue
@@ -195,7 +198,7 @@ def _nothing(
         else:
             sticks[rows] = OPEN_LOOP[name](actors, count, rng)
     good = np.ones(n, dtype=bool)
-    free = np.flatnonzero(kinds == list(nothing.KINDS).index("free"))
+    free = np.flatnonzero(np.array(names)[kinds] == "free")
     if len(free):
         where_m = _flown_m(sticks[free], offset[free], people.take(free))
         path_m = observer.seen(where_m, samples[free])

@@ -66,7 +66,7 @@ def test_what_was_not_asked_is_a_dash() -> None:
     assert estimate([]).text() == "-"
 
 
-def test_a_result_of_other_data_or_half_a_file_is_no_result(tmp_path) -> None:
+def test_a_result_of_another_mark_or_half_a_file_is_no_result(tmp_path) -> None:
     cache = Cache(tmp_path)
     cache.keep({"f1": 0.5}, "people-a", "geometry + trees", 0)
     assert cache.find("people-a", "geometry + trees", 0)["f1"] == 0.5

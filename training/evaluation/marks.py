@@ -1,0 +1,84 @@
+"""What a kept result follows from: people, windows and code. With another mark it is found anew."""
+
+import hashlib
+
+import numpy as np
+import torch
+
+from training.evaluation.contenders import CODE
+from training.evaluation.folds import Size, shown
+from training.evaluation.names import OURS
+from training.evaluation.sources import code_of
+from training.generator.dataset import THESIS, Population, counts_of, holds, populate
+from training.generator.people import FAMILIES
+from training.labels import NONE
+from training.network import Trunk
+from training.windows import examples_of, seen_after
+
+QUESTIONS = ("training/evaluation/folds.py", "training/evaluation/distortions.py")
+"""What every classifier is asked."""
+
+
+class Marks:
+    """The marks of one size of evaluation.
+
+    People and windows are known by what they come to, not by how they are written: some are made,
+    and their numbers are hashed.
+
+    Args:
+        size: of the folds.
+    """
+
+    def __init__(self, size: Size) -> None:
+        made = [
+            one
+            for population in (THESIS, Population("wide", FAMILIES))
+            for one in populate(
+                population, len(population.families), {**counts_of(0.01), NONE: 6}, 0
+            )
+        ]
+        people = hashlib.sha256(repr(size).encode())
+        for one in made:
+            people.update(one.family.encode() + one.times_s.tobytes() + one.sticks.tobytes())
+        self._people = people.hexdigest()[:16]
+        examples = examples_of([one for one in made if one.label != NONE])
+        windows = hashlib.sha256()
+        for drawn in (seen_after(examples, 1.0), seen_after(examples, None), shown(made, 0)):
+            windows.update(drawn.sticks.tobytes() + drawn.lengths.tobytes())
+        self._windows = windows.hexdigest()[:16]
+        self._asked = code_of(*QUESTIONS)
+
+    def classifier(self, name: str) -> str:
+        """Of what a classifier answers."""
+        return f"{self._people} {self._windows} {self._asked} {code_of(*CODE[name])}"
+
+    def hover(self) -> str:
+        """Of what our network suggests to who only holds a place."""
+        held = hashlib.sha256()
+        for hold, places in holds(2, 3.0, 0):
+            held.update(hold.sticks.tobytes() + places.tobytes())
+        code = code_of(
+            "training/evaluation/hover.py", "services/classifier/*.py", "services/synthesis/**/*.py"
+        )
+        return f"{self.classifier(OURS)} {held.hexdigest()[:16]} {code}"
+
+    def adaptation(self) -> str:
+        """Of what a few performances of their own do for unusual people."""
+        code = code_of("training/finetune.py", "training/generator/*.py")
+        return f"{self.classifier(OURS)} {code}"
+
+    def machine(self) -> str:
+        """Of the thesis' machine on its own task."""
+        code = code_of("training/svm.py", "training/generator/calibration.py")
+        return f"{self._people} {code}"
+
+
+def of_recordings() -> str:
+    """The mark of trainings on recordings of people: their code, and what the trunk computes."""
+    with torch.random.fork_rng():
+        torch.manual_seed(0)
+        trunk = Trunk(3, 4)
+        said = trunk(torch.randn(4, 3, 100), torch.ones(4, 1, 100))
+    told = np.round(said.detach().numpy(), 3).tobytes()
+    code = code_of("training/evaluation/human*.py")
+    return f"{code} {hashlib.sha256(told).hexdigest()[:16]}"
