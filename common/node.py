@@ -88,6 +88,7 @@ class Node:
         self._publications: dict[str, tuple[Publication, type[m.Message]]] = {}
         self._sequence: dict[str, int] = {}
         self._closers: list[Callable[[], None]] = []
+        self._besides: list[Node] = []
         self._wake = threading.Condition()
         self._woken = False
         self._latencies_s: deque[float] = deque(maxlen=LATENCY_SAMPLES)
@@ -95,6 +96,15 @@ class Node:
         self._health_of_core: Callable[[], tuple[m.HealthState, str]] = lambda: ("ok", "")
         self._health_since_ns = self.clock.monotonic_ns()
         self._faults = 0
+
+    def beside(self, vehicle: str) -> "Node":
+        """The same service of another vehicle, run and closed by this node."""
+        other = Node(self.bus, vehicle, self.service, self.clock)
+        # One thread waits for all of them, and their main step is one.
+        other._wake, other._latencies_s = self._wake, self._latencies_s
+        other._notify = self._notify  # type: ignore[method-assign]
+        self._besides.append(other)
+        return other
 
     # --- what a service declares -----------------------------------------------------------------
 
@@ -206,9 +216,8 @@ class Node:
 
     def run(self, stop: threading.Event) -> None:
         """Serve until `stop` is set (wake it with `wake`)."""
-        self.bus.announce(alive_key_of(self.vehicle, self.service))
-        self.every(HEALTH_PERIOD_S, self._publish_health)
-        self.publishes(f"health/{self.service}")
+        for node in (self, *self._besides):
+            node._appear()
         while not stop.is_set():
             self.spin()
             wait_s = seconds(self._next_due_ns() - self.clock.monotonic_ns())
@@ -236,14 +245,22 @@ class Node:
                 missed = (now_ns - timer.due_ns) // timer.period_ns
                 timer.due_ns += (missed + 1) * timer.period_ns
                 timer.handler(now_ns)
+        for node in self._besides:
+            node.spin()
 
     def close(self) -> None:
         """Run the closers and leave the bus."""
-        for closer in reversed(self._closers):
-            closer()
+        for node in (*self._besides, self):
+            for closer in reversed(node._closers):
+                closer()
         self.bus.close()
 
     # --- inside ----------------------------------------------------------------------------------
+
+    def _appear(self) -> None:
+        self.bus.announce(alive_key_of(self.vehicle, self.service))
+        self.every(HEALTH_PERIOD_S, self._publish_health)
+        self.publishes(f"health/{self.service}")
 
     def _notify(self) -> None:
         with self._wake:
@@ -251,7 +268,7 @@ class Node:
             self._wake.notify()
 
     def _next_due_ns(self) -> int:
-        return min(timer.due_ns for timer in self._timers)
+        return min(timer.due_ns for node in (self, *self._besides) for timer in node._timers)
 
     def _deliver(self, subscription: _Subscription, payload: bytes, arrival_ns: int) -> None:
         topic = subscription.topic

@@ -1,10 +1,13 @@
 """The vehicle's cameras, their lenses, and the pictures that they are asked for."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from common.camera import DOWN, FRONT, Lens, Mount
+from scipy.spatial.transform import Rotation
+
+from common.camera import Lens, Mount
 from services.sim.body import Quaternion, Vector3
+from services.sim.build import ARDRONE, Build
 from services.sim.config import Config, FrontLens, FrontSize
 from worlds import Body
 
@@ -24,6 +27,8 @@ _MEASURED = Lens(640, 360, (569.9, 568.0, 331.4, 135.9), (-0.527, 0.274, 0.0, 0.
 """A real AR.Drone's front camera as ardrone_autonomy ships its calibration."""
 _DOWN = Lens.of_view(320, 240, math.radians(53.13))
 """About 64 deg along the diagonal, as the AR.Drone's."""
+_NEXT_SEED = 1_000_003
+"""From the seed of one vehicle's pictures to the next one's."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,7 @@ class Camera:
         exposure_s: how long the shutter is open: what moves meanwhile is smeared.
         noise: scale of a picture's noise.
         seed: of that noise.
+        vehicle: whose it is, 0 for the first.
     """
 
     topic: str
@@ -49,6 +55,7 @@ class Camera:
     exposure_s: float = 0.0
     noise: float = 0.0
     seed: int = 0
+    vehicle: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +65,16 @@ class Figure:
     look: tuple[Body, ...]
     position_m: Vector3
     orientation: Quaternion
+
+    def bodies(self) -> list[Body]:
+        """Its bodies in the world."""
+        turn = Rotation.from_quat(self.orientation)
+        places = turn.apply([body.position_m for body in self.look]) + self.position_m
+        turns = (turn * Rotation.from_quat([body.orientation for body in self.look])).as_quat()
+        return [
+            replace(body, position_m=tuple(place), orientation=tuple(turned))
+            for body, place, turned in zip(self.look, places.tolist(), turns.tolist(), strict=True)
+        ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +102,14 @@ class Shot:
     others: tuple[Figure, ...] = ()
 
 
-def cameras_of(config: Config) -> tuple[Camera, Camera]:
-    """The vehicle's cameras, front and down."""
-    eyes = (config.exposure_s, config.picture_noise, config.seed)
+def cameras_of(config: Config, vehicle: int = 0, build: Build = ARDRONE) -> tuple[Camera, Camera]:
+    """A vehicle's cameras, front and down."""
+    seed = config.seed + _NEXT_SEED * vehicle
+    eyes = (config.exposure_s, config.picture_noise, seed, vehicle)
     return (
-        Camera("camera/front", front_lens(config), FRONT, config.front_fps, 0.08, *eyes),
+        Camera("camera/front", front_lens(config), build.front, config.front_fps, 0.08, *eyes),
         # On the ground it is 25 mm above it.
-        Camera("camera/down", _DOWN, DOWN, config.down_fps, 0.01, *eyes),
+        Camera("camera/down", _DOWN, build.down, config.down_fps, 0.01, *eyes),
     )
 
 

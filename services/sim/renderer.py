@@ -28,6 +28,8 @@ SEE_THROUGH = frozenset({"fence"})
 """Textures with holes; they are drawn last."""
 GROUND_SIDE_M = 600.0
 SHADOW_PIXELS = 2048
+MOST_FIGURES = 256
+"""Bodies of vehicles of one shape that are drawn at once."""
 
 LLVMPIPE_THREADS = "0"
 """The drawing thread rasterises itself: a tenth cheaper, and other services need the other core."""
@@ -83,6 +85,14 @@ class GlRenderer:
             [(gl.buffer(corners.tobytes()), "2f", "corner")],
         )
         self._load_textures()
+        # 11 floats a body, as in `_table`.
+        tables = {
+            shape: gl.buffer(reserve=MOST_FIGURES * 44, dynamic=True) for shape in self._meshes
+        }
+        self._figures = {
+            shape: (tables[shape], self._drawn(mesh, tables[shape]))
+            for shape, mesh in self._meshes.items()
+        }
         self._targets: dict[Lens, tuple[Any, Picture]] = {}
         self._scene_objects: list[Any] = []
 
@@ -116,6 +126,8 @@ class GlRenderer:
         # Near to far, so that what is hidden is not painted.
         for flock in self._flocks:
             flock.draw(away_m, 1)
+        if shot.others:
+            self._draw_figures([body for other in shot.others for body in other.bodies()])
         gl.disable(moderngl.CULL_FACE)
         for height_m, (vertices, layer, tint, dash_m) in self._ground:
             self._ground_program["height_m"] = height_m
@@ -140,6 +152,17 @@ class GlRenderer:
     def close(self) -> None:
         """Free everything."""
         self._gl.release()
+
+    def _draw_figures(self, bodies: list[Body]) -> None:
+        """Draw what moves; it casts no shadow on the ground."""
+        for shape in self._meshes:
+            alike = [body for body in bodies if body.shape == shape]
+            for begin in range(0, len(alike), MOST_FIGURES):
+                some = alike[begin : begin + MOST_FIGURES]
+                buffer, vertices = self._figures[shape]
+                buffer.orphan()
+                buffer.write(_table(some, self._layers).tobytes())
+                vertices.render(instances=len(some))
 
     def _target_of(self, lens: Lens) -> tuple[Any, Picture]:
         if lens not in self._targets:

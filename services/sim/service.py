@@ -1,13 +1,16 @@
 """Wiring of the simulator: a clock or the commands drive its steps, messages come out."""
 
 from collections import deque
+from functools import partial
 
 from common import messages as m
 from common.clock import seconds
+from common.config import ConfigError
 from common.node import Node, RefusedError
-from services.sim.cameras import VIDEO_TOPICS, cameras_of
+from services.sim.cameras import VIDEO_TOPICS, Camera, Shot, cameras_of
 from services.sim.config import Config
 from services.sim.core import PHYSICS_HZ, ResetError, Simulation
+from services.sim.crew import crew_of, names_of
 from services.sim.pace import Pace
 from services.sim.studio import Studio
 from services.sim.vehicle import WATCHDOG_S
@@ -19,65 +22,94 @@ COMMAND_DEPTH = 16
 STEPS_A_COMMAND = PHYSICS_HZ // 50
 """In lock-step each command is that of the next 20 ms, its period."""
 IDLE_S = 0.5
-"""In lock-step, the period at which the vehicle says that it is there, whoever waits for whom."""
+"""In lock-step, the period at which a vehicle says that it is there, whoever waits for whom."""
 LOW_FACTOR = 0.95
 
 
 def wire(node: Node, config: Config) -> None:
-    """Connect the simulator to the node."""
+    """Connect the simulator to the node; vehicles but the first get nodes beside it.
+
+    Raises:
+        ConfigError: if the vehicles cannot have the names that are asked for.
+    """
     in_lockstep = config.clock == "lockstep"
+    try:
+        names = names_of(crew_of(config.vehicles, config.plant), node.vehicle)
+    except ValueError as error:
+        raise ConfigError(f"vehicles: {error}") from None
+    nodes = [node, *(node.beside(name) for name in names[1:])]
     simulation = Simulation(config, 0 if in_lockstep else node.clock.utc_ns())
     pace = Pace(node.clock.monotonic_ns())
+    heard: list[deque[tuple[m.Command, int]]] = [deque(maxlen=COMMAND_DEPTH) for _ in nodes]
     studio: Studio | None = None
-    node.publishes("imu", "truth", "altimeter", "vehicle", *VIDEO_TOPICS)
+
+    def cameras() -> list[Camera]:
+        return [
+            camera
+            for actor in simulation.actors
+            for camera in cameras_of(config, actor.index, actor.plant.build)
+        ]
+
+    def show(shot: Shot, picture: m.Image) -> None:
+        nodes[shot.vehicle].publish(shot.topic, picture)
+
     if config.renderer != "none":
-        cameras = cameras_of(config)
-        studio = Studio(config.renderer, cameras, config.jpeg_quality, node.publish)
+        studio = Studio(config.renderer, cameras(), config.jpeg_quality, show)
         studio.load(simulation.scene())
         node.on_close(studio.close)
-    heard: deque[tuple[m.Command, int]] = deque(maxlen=COMMAND_DEPTH)
 
-    def advance(command: m.Command | None) -> None:
-        step = simulation.step(command)
-        for topic, message in step.messages:
-            node.publish(topic, message)
-        if step.shots and studio is not None:
-            studio.take(step.shots)
-            if in_lockstep:
-                studio.finish()
+    def advance(commands: list[m.Command | None]) -> None:
+        for each, step in zip(nodes, simulation.step_all(commands), strict=True):
+            for topic, message in step.messages:
+                each.publish(topic, message)
+            if step.shots and studio is not None:
+                studio.take(step.shots)
+        if in_lockstep and studio is not None:
+            studio.finish()
 
     def tick(now_ns: int) -> None:
         for _ in range(pace.due(now_ns)):
-            advance(_next_fresh(heard, now_ns))
+            advance([_next_fresh(waiting, now_ns) for waiting in heard])
 
-    def hear(command: m.Command, arrival_ns: int) -> None:
-        heard.append((command, arrival_ns))
+    def hear(index: int, command: m.Command, arrival_ns: int) -> None:
+        heard[index].append((command, arrival_ns))
 
-    def obey(command: m.Command, arrival_ns: int) -> None:
-        pace.note(arrival_ns, STEPS_A_COMMAND)
-        advance(command)
-        for _ in range(STEPS_A_COMMAND - 1):
-            advance(None)
+    def obey(index: int, command: m.Command, arrival_ns: int) -> None:
+        hear(index, command, arrival_ns)
+        while all(heard):
+            pace.note(arrival_ns, STEPS_A_COMMAND)
+            advance([waiting.popleft()[0] for waiting in heard])
+            for _ in range(STEPS_A_COMMAND - 1):
+                advance([None] * len(nodes))
 
     def wait(_now_ns: int) -> None:
-        node.publish("vehicle", simulation.status())
+        for each, actor in zip(nodes, simulation.actors, strict=True):
+            each.publish("vehicle", actor.status())
 
-    def reset(request: m.ResetRequest, _now_ns: int) -> m.VehicleStatus:
+    def reset(index: int, request: m.ResetRequest, _now_ns: int) -> m.VehicleStatus:
+        before = simulation.world
         try:
-            status = simulation.reset(request)
+            status = simulation.reset(request, index)
         except ResetError as error:
             raise RefusedError(str(error), error.field) from None
-        heard.clear()
+        for other, waiting in enumerate(heard):
+            if other == index or simulation.world != before:
+                waiting.clear()
         if studio is not None:
-            studio.load(simulation.scene())
+            studio.load(simulation.scene(), cameras())
         return status
 
-    def names(_request: m.WorldsRequest, _now_ns: int) -> m.WorldsReply:
+    def names_worlds(_request: m.WorldsRequest, _now_ns: int) -> m.WorldsReply:
         return m.WorldsReply(worlds=simulation.worlds())
 
     def health() -> tuple[m.HealthState, str]:
         factor = pace.real_time_factor
         detail = f"real-time factor {factor:.3f}, world {simulation.world}"
+        if len(nodes) > 1:
+            detail = f"{detail}, {len(nodes)} vehicles"
+        silent = [name for name, waiting in zip(names, heard, strict=True) if not waiting]
+        if in_lockstep and 0 < len(silent) < len(nodes):
+            detail = f"{detail}, waiting for a command of {', '.join(silent)}"
         is_late = factor < LOW_FACTOR and not in_lockstep
         if studio is None:
             return ("degraded" if is_late else "ok"), f"{detail}, no pictures"
@@ -87,15 +119,19 @@ def wire(node: Node, config: Config) -> None:
         detail = f"{detail}, pictures by {studio.renderer}, {dropped} dropped"
         return ("degraded" if is_late else "ok"), detail
 
+    for index, each in enumerate(nodes):
+        each.publishes("imu", "truth", "altimeter", "vehicle", *VIDEO_TOPICS)
+        if in_lockstep:
+            each.on("command", partial(obey, index), depth=COMMAND_DEPTH, timed=True)
+        else:
+            each.on("command", partial(hear, index), depth=COMMAND_DEPTH)
+        each.answer("sim/reset", partial(reset, index))
+        each.answer("sim/worlds", names_worlds)
+        each.reports(health)
     if in_lockstep:
-        node.on("command", obey, depth=COMMAND_DEPTH, timed=True)
         node.every(IDLE_S, wait)
     else:
-        node.on("command", hear, depth=COMMAND_DEPTH)
         node.every(TICK_S, tick, timed=True)
-    node.answer("sim/reset", reset)
-    node.answer("sim/worlds", names)
-    node.reports(health)
     node.on_close(simulation.close)
 
 

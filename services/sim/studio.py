@@ -3,7 +3,7 @@
 import logging
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Literal
 
 import cv2
@@ -61,20 +61,20 @@ class Studio:
 
     Args:
         choice: of the renderer.
-        cameras: by their topics.
+        cameras: of all vehicles.
         quality: of the JPEG.
-        publish: called on the studio's thread with each picture.
+        publish: called on the studio's thread with each shot and its picture.
     """
 
     def __init__(
         self,
         choice: Choice,
-        cameras: tuple[Camera, ...],
+        cameras: Iterable[Camera],
         quality: int,
-        publish: Callable[[str, m.Message], None],
+        publish: Callable[[Shot, m.Image], None],
     ) -> None:
         self._choice = choice
-        self._cameras = {camera.topic: camera for camera in cameras}
+        self._cameras = _by_owner(cameras)
         self._quality = quality
         self._publish = publish
         self._wake = threading.Condition()
@@ -89,10 +89,12 @@ class Studio:
         self._thread = threading.Thread(target=self._run, name="studio", daemon=True)
         self._thread.start()
 
-    def load(self, scene: Scene) -> None:
-        """Take pictures of this scene from now on."""
+    def load(self, scene: Scene, cameras: Iterable[Camera] | None = None) -> None:
+        """Take pictures of this scene from now on, by other cameras if there are any."""
         with self._wake:
             self._scene = scene
+            if cameras is not None:
+                self._cameras = _by_owner(cameras)
             self._shots.clear()
             self._wake.notify_all()
 
@@ -101,7 +103,7 @@ class Studio:
         with self._wake:
             for shot in shots:
                 self._shots.append(shot)
-                self._drop_before(shot.topic, shot.stamp_ns - LONGEST_WAIT_NS)
+                self._drop_before(shot)
             self._wake.notify_all()
 
     def finish(self) -> None:
@@ -145,17 +147,25 @@ class Studio:
                 return False
             scene, self._scene = self._scene, None
             shot = self._shots.popleft() if self._shots else None
+            camera = self._cameras[shot.vehicle, shot.topic] if shot else None
             self._busy = True
         if scene is not None:
             renderer.load(scene)
-        if shot is not None:
-            picture = photograph(renderer, self._cameras[shot.topic], shot, self._quality)
-            self._publish(shot.topic, picture)
+        if shot is not None and camera is not None:
+            self._publish(shot, photograph(renderer, camera, shot, self._quality))
         return True
 
-    def _drop_before(self, topic: str, stamp_ns: int) -> None:
-        late = [shot for shot in self._shots if shot.topic == topic and shot.stamp_ns < stamp_ns]
-        for shot in late:
-            self._shots.remove(shot)
-            if self._ready:
-                self.dropped[topic] += 1
+    def _drop_before(self, newest: Shot) -> None:
+        """Drop what has waited too long for the camera of the newest shot."""
+        for shot in tuple(self._shots):
+            if (shot.vehicle, shot.topic) == (
+                newest.vehicle,
+                newest.topic,
+            ) and shot.stamp_ns < newest.stamp_ns - LONGEST_WAIT_NS:
+                self._shots.remove(shot)
+                if self._ready:
+                    self.dropped[shot.topic] += 1
+
+
+def _by_owner(cameras: Iterable[Camera]) -> dict[tuple[int, str], Camera]:
+    return {(camera.vehicle, camera.topic): camera for camera in cameras}

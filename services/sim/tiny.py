@@ -29,16 +29,15 @@ class TinyRenderer:
     def __init__(self) -> None:
         self._on = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
         self._scratch = tempfile.TemporaryDirectory()
+        self._figures: list[int] = []
+        self._colours: dict[Texture, tuple[float, ...]] = {}
 
     def load(self, scene: Scene) -> None:
         """Draw this scene from now on."""
         pybullet.resetSimulation(**self._on)
-        colours: dict[Texture, Any] = {}
+        self._figures.clear()
         for body in scene.bodies:
-            if body.texture not in colours:
-                mean = paint(body.texture).picture.reshape(-1, 4).mean(axis=0) / 255.0
-                colours[body.texture] = (*mean[:3], 1.0)
-            add_visible(body, colours[body.texture], **self._on)
+            add_visible(body, self._colour_of(body.texture), **self._on)
         half = GROUND_SIDE_M / 2.0
         ground = pybullet.createVisualShape(
             pybullet.GEOM_BOX, halfExtents=(half, half, 0.01), **self._on
@@ -54,6 +53,13 @@ class TinyRenderer:
     def draw(self, camera: Camera, shot: Shot) -> Picture:
         """The picture (height, width, 3) in BGR."""
         lens = camera.lens
+        for number in self._figures:
+            pybullet.removeBody(number, **self._on)
+        self._figures = [
+            add_visible(body, self._colour_of(body.texture), **self._on)
+            for other in shot.others
+            for body in other.bodies()
+        ]
         view, projection = matrices_of(camera, shot)
         pixels = pybullet.getCameraImage(
             lens.width,
@@ -66,6 +72,12 @@ class TinyRenderer:
         )[2]
         picture = np.asarray(pixels, np.uint8).reshape(lens.height, lens.width, 4)
         return np.asarray(picture[..., 2::-1], np.uint8)
+
+    def _colour_of(self, texture: Texture) -> tuple[float, ...]:
+        if texture not in self._colours:
+            mean = paint(texture).picture.reshape(-1, 4).mean(axis=0) / 255.0
+            self._colours[texture] = (*mean[:3].tolist(), 1.0)
+        return self._colours[texture]
 
     def close(self) -> None:
         """Leave pybullet."""
