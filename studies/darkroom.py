@@ -6,6 +6,7 @@ flight to the bit.
 """
 
 import multiprocessing
+import os
 from collections import deque
 from contextlib import suppress
 from multiprocessing.connection import Connection
@@ -19,6 +20,9 @@ from services.sim.studio import open_renderer, photograph
 
 PAINTERS = 2
 """Of the AR.Drone's two cameras hardly more pictures are asked for before the first is due."""
+
+LLVMPIPE_THREADS = "2"
+"""Of each who draws: while one waits for the other's picture, its processor helps with that one."""
 
 Answer = m.Image | Exception | None
 
@@ -144,6 +148,7 @@ class _Painter:
 def _paint(pipe: Connection, config: Config) -> None:
     """Answer scenes and shots until the other end is closed."""
     cameras = {camera.topic: camera for camera in cameras_of(config)}
+    os.environ.setdefault("LP_NUM_THREADS", LLVMPIPE_THREADS)
     try:
         renderer = open_renderer(config.renderer)
         while True:
