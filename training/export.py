@@ -81,12 +81,24 @@ def load(path: Path) -> Fitted:
     """
     try:
         state = torch.load(path, weights_only=True)
+    except FileNotFoundError:
+        raise OSError(
+            f"weights {path}: no such file; they lie beside the model that 'autocomplete train'"
+            " wrote"
+        ) from None
+    except (RuntimeError, EOFError, pickle.UnpicklingError):
+        raise _unfit(path) from None
+    try:
         network = Network(Architecture(**state["architecture"]))
         network.load_state_dict(state["weights"])
         return Fitted(
             network.eval(), state["temperature"], tuple(state["platt"]), state["confidence_min"]
         )
-    except (RuntimeError, EOFError, KeyError, TypeError, pickle.UnpicklingError):
-        raise OSError(
-            f"weights {path}: not of this version's network; train anew with 'autocomplete train'"
-        ) from None
+    except (RuntimeError, KeyError, TypeError):
+        raise _unfit(path) from None
+
+
+def _unfit(path: Path) -> OSError:
+    return OSError(
+        f"weights {path}: not of this version's network; train anew with 'autocomplete train'"
+    )

@@ -301,8 +301,14 @@ class Training:
         except (RuntimeError, EOFError, pickle.UnpicklingError) as error:
             reason = str(error).split(". ")[0]
             raise OSError(f"checkpoint {path}: cannot be read: {reason}") from None
-        if state["name"] != self._name:
-            raise OSError(f"checkpoint {path}: is of {state['name']}, not of {self._name}")
+        name = state.get("name") if isinstance(state, dict) else None
+        if name is None:
+            raise OSError(f"checkpoint {path}: is none; run without --resume to begin anew")
+        if name != self._name:
+            raise OSError(
+                f"checkpoint {path}: is of {name}, not of {self._name};"
+                " run without --resume to begin anew"
+            )
         self._network.load_state_dict(state["network"])
         self._average.load_state_dict(state["average"])
         self._best = state["best"]

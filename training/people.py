@@ -83,7 +83,7 @@ def people_of(
     tell: Tell = lambda *_: None,
     wide: Population = WIDE,
 ) -> list[Primitive]:
-    """A set of people that no set of another name and seed shares.
+    """A set of people, of whom none is in a set of another seed; the name makes no difference.
 
     Args:
         name: of the set, in the names of its operators.

@@ -207,7 +207,8 @@ def train(
 
     training = people("training", preset.training, 0)
     validation = people("validation", preset.validation, 1)
-    run = Training(training, validation, seed, preset.budget, name=f"{preset_name} seed {seed}")
+    name = f"{preset_name}, {preset.budget.windows} windows, seed {seed}"
+    run = Training(training, validation, seed, preset.budget, name=name)
     if resume:
         run.resume(checkpoint)
     out.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,7 @@
 """`autocomplete dataset generate`: a set by simulated operators."""
 
 import argparse
+from dataclasses import replace
 from functools import partial
 
 from rich.console import Console
@@ -69,7 +70,13 @@ def _run(options: argparse.Namespace) -> int:
 
         make = partial(populate, THESIS) if options.preset == "thesis" else generate
         primitives = make(options.operators, counts, options.seed, progress=advance)
-    made = f"generate --preset {options.preset} --operators {options.operators}"
-    save(options.out, primitives, {"made": f"{made} --seed {options.seed}"})
+    # People of other sets are other people, so that sets may be joined.
+    begin = f"{options.preset}{options.seed}"
+    primitives = [replace(one, operator=f"{begin}-{one.operator}") for one in primitives]
+    made = (
+        f"generate --preset {options.preset} --operators {options.operators}"
+        f" --multiple {options.multiple:g} --none {options.none} --seed {options.seed}"
+    )
+    save(options.out, primitives, {"made": made})
     print(f"{options.out}: {len(primitives)} primitives by {options.operators} operators")
     return 0

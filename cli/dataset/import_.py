@@ -35,7 +35,12 @@ def declare(parser: argparse.ArgumentParser) -> None:
         help="joy: rostopic echo of sensor_msgs/Joy; csv: secs,a,b,c,tri,cir,X,squ;"
         " vectors: cells [a, b, c], label last; mcap: of 'autocomplete record'; npz: a set (auto)",
     )
-    shared.add_people(parser, "who performed (the file's name)", required=False)
+    shared.add_people(
+        parser,
+        "who performed (the file's name; name whoever is in several files, or 'split' takes each"
+        " file for another person)",
+        required=False,
+    )
     labels = parser.add_argument_group("labels")
     labels.add_argument("--label", choices=CLASSES, help="of everything in the files")
     labels.add_argument(

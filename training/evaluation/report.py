@@ -31,7 +31,7 @@ td,th{padding:.25em .8em;border-bottom:1px solid #ddd;text-align:left}
 def _numbers(results: Results) -> str:
     """What was counted, for captions."""
     seeds = max((len(found) for found in results.judged.values()), default=0)
-    return f"{seeds} seeds; mean ± 95 % interval over seeds (Student)"
+    return f"{seeds} {'seed' if seeds == 1 else 'seeds'}; mean ± 95 % interval over seeds (Student)"
 
 
 def _bars(results: Results) -> Table:

@@ -10,6 +10,7 @@ Array32 = NDArray[np.float32]
 
 
 EVERY_WINDOWS = 3
+"""Of all windows, those who learn slowly are shown one in so many."""
 
 
 def thinned(windows: Windows) -> Windows:

@@ -149,6 +149,16 @@ def test_generate_makes_the_same_set_for_the_same_seed(tmp_path: Path) -> None:
     assert {p.label for p in found} == {"line", "arc", "sine", "helix", "none"}
     assert len({p.operator for p in found}) == 3
     assert dataset("check", tmp_path / "a.npz") == 0
+    made = open_set(tmp_path / "a.npz").provenance["made"]
+    assert made == "generate --preset wide --operators 3 --multiple 0.004 --none 3 --seed 7"
+
+
+def test_people_of_other_seeds_have_other_names(tmp_path: Path) -> None:
+    for seed in (0, 1):
+        small = ("--operators", 2, "--multiple", 0.002, "--seed", seed)
+        assert dataset("generate", "--out", tmp_path / f"{seed}.npz", *small) == 0
+    one, other = ({p.operator for p in load(tmp_path / f"{seed}.npz")} for seed in (0, 1))
+    assert not one & other
 
 
 def test_generate_makes_the_population_of_the_thesis(tmp_path: Path) -> None:

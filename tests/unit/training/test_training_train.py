@@ -2,6 +2,7 @@ import json
 from pathlib import Path
 
 import pytest
+import torch
 
 from cli.main import main
 from services.classifier.model import OnnxModel
@@ -99,12 +100,22 @@ def test_people_are_the_same_in_any_number_of_processes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "reason"), [(None, "there is no"), (b"nonsense", "cannot be read")]
+    ("content", "reason"),
+    [
+        (None, "there is no"),
+        (b"nonsense", "cannot be read"),
+        ({"weights": 1}, "is none; run without --resume"),
+    ],
 )
 def test_what_cannot_be_resumed_is_one_line(
-    content: bytes | None, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    content: bytes | dict[str, object] | None,
+    reason: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    if content is not None:
+    if isinstance(content, dict):
+        torch.save(content, tmp_path / "intent.checkpoint")
+    elif content is not None:
         (tmp_path / "intent.checkpoint").write_bytes(content)
     assert main(["train", "--preset", "quick", "--resume", "--out", str(tmp_path)]) == 1
     error = capsys.readouterr().err
