@@ -21,15 +21,9 @@ ASKED_SAMPLES = (SHORTEST_SAMPLES, WINDOW_SAMPLES + 20)
 """When a service asks does not depend on how long a primitive will last: cuts must not either, or
 a short window would tell of a short primitive."""
 EARLY_SAMPLES = (SHORTEST_SAMPLES, 160)
-EARLY_SHARE = 0.2
-"""Of the cuts, those in the first 3.2 s: an early answer is worth more than a late one."""
-WHOLE_SHARE = 0.3
-HEAD_CUT_SHARE = 0.2
 HEADLESS_SAMPLES = 80
 """What is left of a window without its beginning, at least."""
 MIRROR_SHARE = 0.5
-SPLICE_SHARE = 0.15
-"""Windows that begin with the end of another primitive, flown into this one without a pause."""
 SPLICE_SAMPLES = (20, 250)
 SETTLED_SAMPLES = 60
 """The newer primitive is asked for once 1.2 s of it are seen."""
@@ -39,6 +33,28 @@ SLOW = 0.15
 SCALE = (0.45, 1.1)
 MOTION_SHARE = 0.5
 """Of the windows of nothing, those that begin where a service would see a motion begin."""
+
+
+@dataclass(frozen=True)
+class Cuts:
+    """How often windows are cut in which way; the rest are cut anywhere.
+
+    Attributes:
+        whole: end where the primitive ends.
+        early: of the others, those that end in the first 3.2 s: an early answer is worth more than
+            a late one.
+        headless: lack their beginning.
+        spliced: begin with the end of another primitive, flown into this one without a pause.
+    """
+
+    whole: float = 0.3
+    early: float = 0.2
+    headless: float = 0.2
+    spliced: float = 0.15
+
+
+CUTS = Cuts()
+"""What our network learns from."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +150,7 @@ def random_windows(
 
 
 def random_tracks(
-    examples: Examples, rng: np.random.Generator, *, augment: bool = True
+    examples: Examples, rng: np.random.Generator, *, augment: bool = True, cuts: Cuts = CUTS
 ) -> list[Array32]:
     """One window of each example: cut at a random time, some without their beginning.
 
@@ -144,43 +160,44 @@ def random_tracks(
         examples: what to cut.
         rng: source of the cuts.
         augment: whether to splice, mirror and scale as well.
+        cuts: how often which.
     """
     tracks = []
     shapes = np.flatnonzero(examples.labels != NONE_INDEX)
     for track, label in zip(examples.tracks, examples.labels, strict=True):
         window: Array32 | None = None
         if label == NONE_INDEX:
-            window = _of_nothing(track, rng)
-        elif augment and rng.random() < SPLICE_SHARE:
+            window = _of_nothing(track, rng, cuts)
+        elif augment and rng.random() < cuts.spliced:
             before = examples.tracks[int(shapes[rng.integers(len(shapes))])]
             window = spliced(before, track, rng)
         if window is None:
-            window = _cut(track, rng)
+            window = _cut(track, rng, cuts)
         tracks.append(_augmented(window, rng) if augment else window)
     return tracks
 
 
-def _asked(rng: np.random.Generator) -> int:
+def _asked(rng: np.random.Generator, cuts: Cuts) -> int:
     """After how many samples a service asks."""
-    return int(rng.integers(*(EARLY_SAMPLES if rng.random() < EARLY_SHARE else ASKED_SAMPLES)))
+    return int(rng.integers(*(EARLY_SAMPLES if rng.random() < cuts.early else ASKED_SAMPLES)))
 
 
-def _cut(track: Array32, rng: np.random.Generator) -> Array32:
+def _cut(track: Array32, rng: np.random.Generator, cuts: Cuts) -> Array32:
     """A window that ends at a random time, and may lack its beginning."""
     end = len(track)
-    if rng.random() > WHOLE_SHARE:
-        end = min(end, _asked(rng))
+    if rng.random() > cuts.whole:
+        end = min(end, _asked(rng, cuts))
     begin = max(0, end - WINDOW_SAMPLES)
-    if rng.random() < HEAD_CUT_SHARE and end - begin > HEADLESS_SAMPLES:
+    if rng.random() < cuts.headless and end - begin > HEADLESS_SAMPLES:
         begin = int(rng.integers(begin, end - HEADLESS_SAMPLES))
     return track[begin:end]
 
 
-def _of_nothing(track: Array32, rng: np.random.Generator) -> Array32:
+def _of_nothing(track: Array32, rng: np.random.Generator, cuts: Cuts) -> Array32:
     """A window of no primitive, cut at a random time."""
     window = track
-    if rng.random() > WHOLE_SHARE:
-        window = track[: _asked(rng)]
+    if rng.random() > cuts.whole:
+        window = track[: _asked(rng, cuts)]
     if rng.random() < MOTION_SHARE:
         motion = window[newest_motion(window, MODEL_RATE_HZ)]
         if len(motion) >= SHORTEST_SAMPLES:

@@ -20,7 +20,7 @@ from training.generator.dataset import THESIS, Population, counts_of, populate
 from training.generator.nothing import KINDS
 from training.generator.people import FAMILIES
 from training.labels import NONE
-from training.windows import Windows, examples_of, padded, random_tracks
+from training.windows import Cuts, Windows, examples_of, padded, random_tracks
 
 SEEDS = 5
 PLANT = "tum"
@@ -57,6 +57,8 @@ SIZES = {
     "quick": Size(24, 0.08, 12, 0.05, 0.25, 8, 0.04, 2, 10_000),
 }
 VALIDATION_SHARE = 1 / 6
+PEERS_CUTS = Cuts(whole=0.3, early=0.2, headless=0.2, spliced=0.15)
+"""Of the windows that all are shown but our network, which cuts its own."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ def shown(primitives: Sequence[Primitive], seed: int) -> Windows:
     """Windows of the four primitives: each performance whole, and cut at a random time."""
     examples = examples_of([one for one in primitives if one.label != NONE])
     whole = [track[-WINDOW_SAMPLES:] for track in examples.tracks]
-    cut = random_tracks(examples, np.random.default_rng(seed))
+    cut = random_tracks(examples, np.random.default_rng(seed), cuts=PEERS_CUTS)
     return padded([*whole, *cut], np.concatenate([examples.labels, examples.labels]))
 
 
