@@ -15,6 +15,7 @@ from training.evaluation.cache import Cache
 from training.evaluation.contenders import CONTENDERS, contender
 from training.evaluation.folds import SEEDS, SIZES, Fold, fold
 from training.evaluation.human import HUMAN_SETS, HumanSet, judge_human
+from training.evaluation.human_trunk import STEPS
 from training.evaluation.judging import adapted, hovered, judge
 from training.evaluation.latency import latency
 from training.evaluation.marks import Marks, of_recordings
@@ -180,7 +181,7 @@ class Evaluation:
         """One set of recordings and one seed."""
         if self._cache.find(self._recordings, "people", human.name, seed) is not None:
             return
-        steps = human.steps if self._order.size == "full" else 20
+        steps = STEPS if self._order.size == "full" else 20
         begin_ns = self._clock.monotonic_ns()
         found = judge_human(human, steps, seed, partial(self._telling(seed), human.name))
         found["took_s"] = seconds(self._clock.monotonic_ns() - begin_ns)
