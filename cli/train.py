@@ -22,6 +22,12 @@ PRESETS = ("shipped", "quick")
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
+    parser.description = (
+        "Trains the network on simulated people, judges it on others, and writes the file that"
+        " the classifier loads (intent.onnx), its weights (intent.pt, what --finetune begins with),"
+        " its card (README.md) and its figures (intent.json). A run that was stopped leaves"
+        " intent.checkpoint in the folder; --resume goes on with it. docs/model.md tells more."
+    )
     job = parser.add_mutually_exclusive_group()
     job.add_argument(
         "--preset",
@@ -52,8 +58,12 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--model",
         metavar="FILE",
         type=Path,
-        default=Path("models/intent.onnx"),
         help="the model that --finetune begins with (models/intent.onnx)",
+    )
+    parser.add_argument(
+        "--operator",
+        metavar="NAME",
+        help="whom of the file's people --finetune adapts to (needed if there are several)",
     )
     job.add_argument(
         "--ablation",
@@ -106,7 +116,13 @@ def _run(options: argparse.Namespace) -> int:
             f"{error.name} is missing; install it with pip install -e '.[training]'"
         ) from None
     if options.resume and (options.finetune or options.ablation):
-        raise ValueError("--resume goes on with a training; it has no meaning here")
+        raise ValueError("--resume goes on with a training; leave it or the other job out")
+    if options.model is not None and options.finetune is None:
+        raise ValueError("--model is what --finetune begins with; name a file with --finetune")
+    if options.operator is not None and options.finetune is None:
+        raise ValueError("--operator is whom --finetune adapts to; name a file with --finetune")
+    if options.out is not None and options.ablation is not None:
+        raise ValueError("--out is a model's folder; --ablation writes its page only")
     console = Console()
     with counted(console) as progress:
         bars = _Bars(progress)
@@ -134,11 +150,14 @@ def _finetune(console: Console, options: argparse.Namespace, bars: _Bars) -> int
     for finding in findings:
         console.print(f"left out: {finding}")
     out = options.out or Path("models/finetuned")
-    done = finetune(primitives, options.model, out, options.seed, bars.generating)
+    begin = options.model or Path("models/intent.onnx")
+    done = finetune(primitives, begin, out, options.seed, bars.generating, options.operator)
     console.print(
-        f"{done.performances} performances: F1 {done.before:.3f} before;"
+        f"{done.performances} performances by {done.operator}: F1 {done.before:.3f} before;"
         f" {done.after:.3f} after, on those left out of each of three adaptations"
     )
+    if not done.of_use:
+        console.print("no more of them were named right than before, so the model stays as it was")
     console.print(f"{done.path}  sha256 {done.sha256[:8]}")
     return 0
 

@@ -251,17 +251,29 @@ def _adapted(results: Results) -> list[Bar]:
     people = [one for found in results.judged[OURS].values() for one in found.get("adapted", [])]
     if not people:
         return []
-    gained, lost = (
-        estimate(100.0 * sign * (one[f"{who}_after"] - one[f"{who}_before"]) for one in people)
-        for who, sign in (("own", 1.0), ("others", -1.0))
-    )
+
+    def points(who: str, sign: float, kinds: tuple[str, ...]) -> Estimate:
+        changed = [
+            one[f"{who}_after"] - one[f"{who}_before"] for one in people if one["kind"] in kinds
+        ]
+        return estimate(100.0 * sign * change for change in changed)
+
+    gained, noisy = (points("own", 1.0, (kind,)) for kind in ("odd", "clumsy"))
+    lost = points("others", -1.0, ("odd", "clumsy"))
     return [
         Bar(
-            f"F1 gained by 5 examples a class, {len(people)} unusual people",
+            f"F1 gained by 5 examples a class, {gained.count} people with odd ways",
             f">= {GAINED_POINTS:g} points",
             gained.text(1),
             "-",
             at_least(gained.mean, GAINED_POINTS, 1),
+        ),
+        Bar(
+            f"likewise, {noisy.count} people of ordinary ways and twice the noise",
+            "-",
+            noisy.text(1),
+            "-",
+            "-",
         ),
         Bar(
             "F1 that others lose by it",

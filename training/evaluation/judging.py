@@ -17,16 +17,16 @@ from training.evaluation.measures import tally
 from training.evaluation.names import CALIBRATED, KNOWN, MOMENTS, WHOLE
 from training.evaluation.ours import Ours
 from training.evaluation.rejection import rejection
-from training.finetune import adaptation_study
+from training.evaluation.unusual import adaptation_study
 from training.generator.dataset import holds
 from training.windows import examples_of, seen_after
 
 PERIODS_S = (1.0, 0.1)
 """The longest and the shortest T of the service."""
 
-ADAPTED = 4
-"""So many people a seed show five performances of each primitive of their own."""
-REPLAYED = 1500
+ODD, CLUMSY = 12, 4
+"""So many unusual people a seed show five performances of each primitive of their own."""
+REPLAYED = 3000
 """So many performances of others are kept in mind meanwhile."""
 DISTORTED = 240
 """So many performances are distorted in each way."""
@@ -102,7 +102,7 @@ def adapted(ours: Ours, fold: Fold, seed: int) -> list[dict[str, Any]]:
         examples_of(replay),
         examples_of(fold.tests[KNOWN]),
         seed,
-        people=ADAPTED,
-        candidates=3 * ADAPTED,
+        ODD,
+        CLUMSY,
     )
     return [vars(person) for person in study]

@@ -64,7 +64,9 @@ class Marks:
 
     def adaptation(self) -> str:
         """Of what a few performances of their own do for unusual people."""
-        code = code_of("training/finetune.py", "training/generator/*.py")
+        code = code_of(
+            "training/adaptation.py", "training/evaluation/unusual.py", "training/generator/*.py"
+        )
         return f"{self.classifier(OURS)} {code}"
 
     def machine(self) -> str:
