@@ -43,6 +43,14 @@ Plant = Annotated[
     str,
     Meta(min_length=1, max_length=32, description="`tum`, `ardrone`, or another kind of vehicle"),
 ]
+FullStickSpeeds = Annotated[
+    tuple[NonNegative, NonNegative, NonNegative, NonNegative, NonNegative],
+    Meta(description="forward, left, up, down in m/s, turn in rad/s"),
+]
+FollowingRates = Annotated[
+    tuple[NonNegative, NonNegative, NonNegative],
+    Meta(description="level, upright, turn in 1/s"),
+]
 
 
 def _require_finite(value: object, field: str) -> None:
@@ -208,13 +216,19 @@ class Image(Message, frozen=True, kw_only=True):
 
 
 class VehicleStatus(Message, frozen=True, kw_only=True):
-    """The vehicle's own state."""
+    """The vehicle's own state.
+
+    One that is neither `tum` nor `ardrone` says how it follows the stick: its steady speeds at full
+    stick, and how fast each comes, as dv/dt = rate (speed - v); 0 where it cannot move at all.
+    """
 
     state: VehicleState
     battery: Confidence
     world: str
     plant: Plant
     collisions: Count
+    full_stick: FullStickSpeeds | None = None
+    rates: FollowingRates | None = None
 
 
 class Health(Message, frozen=True, kw_only=True):

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from common.messages import Command, Stick
+from common.messages import Command, Stick, VehicleStatus
 
 DEAD_BAND = 0.05
 """Deflections up to this are neutral (rpg_quadrotor_control's manual_flight_assistant)."""
@@ -42,6 +42,14 @@ FULL_STICK: dict[str, FullStick] = {
     # downwards; yaw c6 is 90 deg/s.
     "ardrone": FullStick(_TILTED_MPS, _TILTED_MPS, 0.6, math.pi / 2.0, 1.2, linear_to=0.5),
 }
+
+
+def full_stick_of(status: VehicleStatus) -> FullStick:
+    """What full stick is on a vehicle; one of which that is not known passes for a `tum`."""
+    if status.full_stick is None:
+        return FULL_STICK.get(status.plant, FULL_STICK["tum"])
+    forward_mps, left_mps, up_mps, down_mps, yaw_radps = status.full_stick
+    return FullStick(forward_mps, left_mps, up_mps, yaw_radps, down_mps)
 
 
 def is_neutral(stick: Stick | Command, dead_band: float = DEAD_BAND) -> bool:

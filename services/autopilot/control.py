@@ -12,7 +12,7 @@ from common.messages import Command, Pose
 from services.autopilot.config import Config
 from services.autopilot.disturbance import Disturbance
 from services.autopilot.pid import Gains, Pid, limit_norm
-from services.autopilot.plants import PLANTS
+from services.autopilot.plants import PLANTS, Plant
 
 PLANE_LIMIT_MPS2 = 2.0
 UP_LIMIT_MPS2 = 1.0
@@ -63,13 +63,14 @@ class Controller:
     """Keeps the vehicle at a moving reference. Its memory outlives a change of references.
 
     Args:
-        plant: a name of `PLANTS`.
+        plant: its name, of `PLANTS` unless there is a model.
         config: gains.
+        model: how it follows its sticks.
     """
 
-    def __init__(self, plant: str, config: Config) -> None:
+    def __init__(self, plant: str, config: Config, model: Plant | None = None) -> None:
         self.plant_name = plant
-        self.plant = PLANTS[plant]
+        self.plant = model or PLANTS[plant]
         self.disturbance = Disturbance(self.plant)
         self._plane = Pid(
             Gains(config.plane_p, config.plane_i, config.plane_d, PLANE_LIMIT_MPS2), 2

@@ -20,6 +20,7 @@ from services.autopilot.guard import Guard
 from services.autopilot.hold import Hold
 from services.autopilot.link import StickLink
 from services.autopilot.path import BadPathError
+from services.autopilot.plants import PLANTS, plant_of
 
 NONCES = 1024
 """Answers that are remembered."""
@@ -78,6 +79,8 @@ class Autopilot:
         self._link = StickLink(config.stick_loss_s, config.dead_band, config.stuck_s)
         self._guard = Guard(config.slew_ps)
         self._controller = Controller(DEFAULT_PLANT, config)
+        self._is_known = True
+        """Whether there is a model of the vehicle; else it is steered by hand alone."""
         self._pose: m.Pose | None = None
         self._pose_ns: int | None = None
         self._poses_since_ns = now_ns
@@ -140,7 +143,11 @@ class Autopilot:
         """Take the vehicle's own state in."""
         self._vehicle, self._vehicle_ns = vehicle, now_ns
         if vehicle.plant != self._controller.plant_name:
-            self._controller = Controller(vehicle.plant, self._config)
+            model = plant_of(vehicle)
+            self._is_known = model is not None
+            self._controller = Controller(
+                vehicle.plant, self._config, model or PLANTS[DEFAULT_PLANT]
+            )
             self._hold = None
             self._happen(Event.VEHICLE_CHANGED, now_ns)
         self._watch(now_ns)
@@ -273,6 +280,8 @@ class Autopilot:
         told = self._vehicle.state if self._vehicle else None
         if told is not None and told != "flying":
             return told
+        if not self._is_known:
+            return "plant"
         if self._state.action != "fly":
             return self._state.action
         if not self._link.is_live(now_ns):
@@ -363,6 +372,7 @@ class Autopilot:
         since_ns = self._link.steady_since_ns(now_ns)
         return (
             self._state.action == "fly"
+            and self._is_known
             and not self._link.is_deflected(now_ns)
             and self._vehicle is not None
             and self._vehicle.state == "flying"

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from common.messages import VehicleStatus
 from common.sticks import FULL_STICK
 
 
@@ -55,3 +56,19 @@ PLANTS: dict[str, Plant] = {
     # tum_ardrone 6bcfb34: the speed follows the tilt with c1, the tilt the stick with c3; c7, c5.
     "ardrone": _plant("ardrone", (0.58, 1.0 / 7.0), 0.8, 25.0),
 }
+
+
+def plant_of(status: VehicleStatus) -> Plant | None:
+    """The model of a vehicle; None if it has none, or cannot move to every side as drones do."""
+    if status.full_stick is None or status.rates is None:
+        return PLANTS.get(status.plant)
+    if not all((*status.full_stick, *status.rates)):
+        return None
+    forward_mps, left_mps, up_mps, down_mps, yaw_radps = status.full_stick
+    level_ps, upright_ps, turn_ps = status.rates
+    return Plant(
+        plane=Response(level_ps, 0.0, min(forward_mps, left_mps)),
+        up=Response(upright_ps, 0.0, up_mps),
+        down=Response(upright_ps, 0.0, down_mps),
+        yaw=Response(turn_ps, 0.0, yaw_radps),
+    )

@@ -4,7 +4,7 @@ import numpy as np
 
 from common.clock import NS_PER_S, seconds
 from common.messages import NONE_LABEL, ClassifyRequest, Intent, Stick, VehicleStatus
-from common.sticks import FULL_STICK
+from common.sticks import FULL_STICK, full_stick_of
 from common.topics import TOPICS
 from services.classifier.config import Config
 from services.classifier.model import SHORTEST_SAMPLES, Model, ModelError
@@ -53,7 +53,7 @@ class Classifier:
         self._config = config
         self._window = StickWindow()
         self._arrival_ns: int | None = None
-        self._plant = _PLANT
+        self._full = FULL_STICK[_PLANT]
 
     def on_stick(self, stick: Stick, arrival_ns: int) -> None:
         """Take a stick; `arrival_ns` is on the receiver's clock."""
@@ -62,7 +62,7 @@ class Classifier:
 
     def on_vehicle(self, status: VehicleStatus, _arrival_ns: int) -> None:
         """Take what is flown: its yaw rate tells how far a held yaw stick turns it."""
-        self._plant = status.plant
+        self._full = full_stick_of(status)
 
     def intent(self, now_ns: int, session_ns: int) -> Intent:
         """What the operator means now.
@@ -131,7 +131,7 @@ class Classifier:
 
     def _full_yaw_radps(self) -> float:
         radps = self._config.full_stick_yaw_radps
-        return FULL_STICK[self._plant].yaw_radps if radps is None else radps
+        return self._full.yaw_radps if radps is None else radps
 
     def _none(self, end_ns: int, motion: Motion | None = None) -> Intent:
         """No primitive: all are equally (un)likely."""

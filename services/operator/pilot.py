@@ -14,7 +14,7 @@ import numpy as np
 
 from common.clock import nanoseconds, seconds
 from common.messages import AutopilotStatus, DecideAction, Pose, Suggestion, VehicleStatus
-from common.sticks import FULL_STICK
+from common.sticks import FULL_STICK, full_stick_of
 from common.topics import TOPICS
 from services.operator.eyes import Eyes, Sight
 from services.operator.hands import Hands
@@ -296,7 +296,7 @@ class Pilot:
         if self._vehicle[1].world != self._route.world:
             self._note(note=f"the vehicle is in world {self._vehicle[1].world}")
             return None
-        self._full = FULL_STICK[self._vehicle[1].plant]
+        self._full = full_stick_of(self._vehicle[1])
         self._begin_ns = now_ns
         if self._vehicle[1].state == "flying":
             self._enter(Phase.CLIMBING, now_ns)

@@ -145,6 +145,8 @@ class Actor:
             world=self.world,
             plant=self.plant_name,
             collisions=self._vehicle.collisions,
+            full_stick=self.plant.full_stick,
+            rates=self.plant.rates,
         )
 
     def act(self, command: m.Command | None) -> None:

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
+from common.messages import FollowingRates, FullStickSpeeds
 from services.sim.body import BodyState, Loads, Sticks, Vector3
 from services.sim.build import ARDRONE, Build
 
@@ -16,6 +17,9 @@ class Plant(ABC):
         noise: what is added to each stick at 50 Hz, uniform within +-this.
         drift: what is added besides, redrawn every 5 s.
         life_s: how long one charge lasts, of hover or of driving.
+        full_stick: the steady speeds at full stick, as `vehicle` tells them to those who steer;
+            None for those that the contract knows.
+        rates: how fast it follows, the same.
     """
 
     build: ClassVar[Build] = ARDRONE
@@ -24,6 +28,8 @@ class Plant(ABC):
     drift: ClassVar[float] = 0.0
     # What the AR.Drone's maker states.
     life_s: ClassVar[float] = 12 * 60.0
+    full_stick: ClassVar[FullStickSpeeds | None] = None
+    rates: ClassVar[FollowingRates | None] = None
 
     @abstractmethod
     def __init__(self, step_s: float) -> None: ...

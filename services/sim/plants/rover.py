@@ -9,6 +9,7 @@ body: forward as the motors drive them, sideways against any slip, as far as rub
 import math
 from typing import ClassVar
 
+from common.messages import FollowingRates, FullStickSpeeds
 from services.sim.body import GRAVITY_MPS2, NO_LOADS, BodyState, Loads, Sticks, Vector3, clip
 from services.sim.build import Build
 from services.sim.plant import Plant
@@ -66,6 +67,8 @@ class RoverPlant(Plant):
     )
     flies: ClassVar[bool] = False
     life_s: ClassVar[float] = 4 * 3600.0
+    full_stick: ClassVar[FullStickSpeeds | None] = (FORWARD_MPS, 0.0, 0.0, 0.0, TURN_RADPS)
+    rates: ClassVar[FollowingRates | None] = (1.0 / MOTOR_S, 0.0, 1.0 / MOTOR_S)
 
     def __init__(self, step_s: float) -> None:
         self._step_s = step_s
