@@ -38,8 +38,9 @@ def wire(node: Node, config: Config) -> None:
     except ValueError as error:
         raise ConfigError(f"vehicles: {error}") from None
     nodes = [node, *(node.beside(name) for name in names[1:])]
-    simulation = Simulation(config, 0 if in_lockstep else node.clock.utc_ns())
+    # Both clocks at once, or stamps would stay behind by what it takes to build the world.
     pace = Pace(node.clock.monotonic_ns())
+    simulation = Simulation(config, 0 if in_lockstep else node.clock.utc_ns())
     heard: list[deque[tuple[m.Command, int]]] = [deque(maxlen=COMMAND_DEPTH) for _ in nodes]
     studio: Studio | None = None
 
