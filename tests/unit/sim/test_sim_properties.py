@@ -5,13 +5,17 @@ import math
 import numpy as np
 import pytest
 from flights import command, fly, hovering
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from common.messages import ResetRequest
 from common.sticks import FULL_STICK
 from services.sim import plants as all_plants
 from services.sim.body import GRAVITY_MPS2, BodyState, Sticks
+from services.sim.config import Config
+from services.sim.core import STEP_S, Simulation
+from services.sim.plants.rover import FORWARD_MPS, TURN_RADPS
+from services.sim.vehicle import StickNoise
 
 PLAN_S = 0.5
 fraction = st.one_of(st.floats(-1.0, 1.0), st.sampled_from((-1.0, 1.0)))
@@ -19,8 +23,13 @@ sticks = st.builds(Sticks, fraction, fraction, fraction, fraction)
 plants = pytest.mark.parametrize(
     "plant", [name for name in all_plants.names() if all_plants.load(name).flies]
 )
-TILT_LIMIT_RAD = {"tum": 0.75, "ardrone": math.acos(math.cos(0.21) ** 2) * 1.05}
-"""tum has 0.5 rad an axis, which its loop overshoots; ardrone 0.21 rad an axis, by its driver."""
+TILT_LIMIT_RAD = {"tum": math.acos(math.cos(0.5) ** 2), "ardrone": math.acos(math.cos(0.21) ** 2)}
+"""Of two axes at once: 0.5 rad each by tum_simulator, 0.21 rad each by the AR.Drone's driver."""
+SPEED_EXCESS = {"tum": 1.2, "ardrone": 1.05}
+"""Beyond full stick along both axes: noise on the sticks, and the overshoot of tum's loops."""
+CLIMB_EXCESS = 1.05
+FULL = Sticks(1.0, 1.0, 1.0, 1.0)
+DIVE = Sticks(-1.0, 1.0, -1.0, -1.0)
 
 
 @plants
@@ -28,7 +37,7 @@ TILT_LIMIT_RAD = {"tum": 0.75, "ardrone": math.acos(math.cos(0.21) ** 2) * 1.05}
 @given(plan=st.lists(sticks, min_size=1, max_size=4))
 def test_mirrored_sticks_give_mirrored_flight(plant: str, plan: list[Sticks]) -> None:
     def path(side: float) -> np.ndarray:
-        simulation = hovering(plant=plant, height_m=5.0)
+        simulation = hovering(plant=plant, height_m=5.0, renderer="none")
         states: list[BodyState] = []
         for each in plan:
             mirrored = Sticks(each.vx, side * each.vy, each.vz, side * each.wz)
@@ -40,33 +49,47 @@ def test_mirrored_sticks_give_mirrored_flight(plant: str, plan: list[Sticks]) ->
 
 
 @plants
-@settings(max_examples=8, deadline=None)
-@given(plan=st.lists(sticks, min_size=1, max_size=6))
-def test_no_stick_takes_it_beyond_the_limits_of_the_plant(plant: str, plan: list[Sticks]) -> None:
+@settings(max_examples=12, deadline=None)
+@given(
+    plan=st.lists(st.tuples(sticks, st.sampled_from((0.1, 0.3, 1.0))), min_size=1, max_size=12),
+    seed=st.integers(0, 1000),
+)
+@example(plan=[(FULL, 10.0)], seed=0)
+@example(plan=[(DIVE, 10.0)], seed=0)
+@example(plan=[(FULL, 0.3), (DIVE, 0.3)] * 10, seed=0)
+def test_no_stick_takes_it_beyond_the_limits_of_the_plant(
+    plant: str, plan: list[tuple[Sticks, float]], seed: int
+) -> None:
     full = FULL_STICK[plant]
-    begin_m = 12.0
-    simulation = hovering(plant=plant, height_m=begin_m, command_noise=1.0)
-    # Noise, and the overshoot of tum's loops.
-    level_mps = 1.3 * math.hypot(full.forward_mps, full.left_mps)
-    down_mps, up_mps = 1.4 * full.down_mps, 1.4 * full.up_mps
-    passed_s = 0.0
-    for each in plan:
-        for state in fly(simulation, PLAN_S, each)[0]:
-            vx, vy, vz = state.velocity_mps
-            assert math.hypot(vx, vy) < level_mps
-            assert -down_mps < vz < up_mps
-            assert state.tilt_rad < TILT_LIMIT_RAD[plant]
-        passed_s += PLAN_S
-        energy = 0.5 * math.hypot(vx, vy, vz) ** 2 + GRAVITY_MPS2 * state.position_m[2]
-        most = 0.5 * math.hypot(level_mps, down_mps) ** 2
-        assert energy < most + GRAVITY_MPS2 * (begin_m + up_mps * passed_s)
+    begin_m = 50.0
+    simulation = hovering(
+        plant=plant,
+        height_m=begin_m,
+        command_noise=1.0,
+        seed=seed,
+        ceiling_m=100.0,
+        renderer="none",
+    )
+    level_mps = SPEED_EXCESS[plant] * math.hypot(full.forward_mps, full.left_mps)
+    down_mps, up_mps = CLIMB_EXCESS * full.down_mps, CLIMB_EXCESS * full.up_mps
+    states = [state for each, duration_s in plan for state in fly(simulation, duration_s, each)[0]]
     simulation.close()
+    for count, state in enumerate(states, start=1):
+        vx, vy, vz = state.velocity_mps
+        assert math.hypot(vx, vy) < level_mps
+        assert -down_mps < vz < up_mps
+        assert state.tilt_rad < TILT_LIMIT_RAD[plant]
+        # Nothing but a climb stores more energy than the top speed has.
+        climbed_m = state.position_m[2] - begin_m
+        energy = 0.5 * math.hypot(vx, vy, vz) ** 2 + GRAVITY_MPS2 * climbed_m
+        most = 0.5 * math.hypot(level_mps, up_mps) ** 2 + GRAVITY_MPS2 * up_mps * count * STEP_S
+        assert energy < most
 
 
 @plants
 def test_hands_off_it_wanders_as_far_as_its_noise_carries_it(plant: str) -> None:
     flights, duration_s, step_s = 8, 15.0, 0.02
-    simulation = hovering(plant=plant, height_m=5.0, command_noise=1.0)
+    simulation = hovering(plant=plant, height_m=5.0, command_noise=1.0, renderer="none")
     ends_m = []
     for seed in range(flights):
         simulation.reset(ResetRequest(seed=seed))
@@ -85,6 +108,45 @@ def test_hands_off_it_wanders_as_far_as_its_noise_carries_it(plant: str) -> None
         speed += step_s / delay_s * (row / full.linear_to * full.forward_mps - speed)
         way += step_s * speed
     assert np.std(ends_m) == pytest.approx(way.std(), rel=0.4)
+
+
+@plants
+def test_noise_on_sticks_is_uniform_and_redrawn_as_often_as_stated(plant: str) -> None:
+    noise, drift = all_plants.load(plant).noise, all_plants.load(plant).drift
+    source = StickNoise(np.random.default_rng(1), noise, drift, STEP_S)
+    each = [source.add_to(FULL) for _ in range(round(50.0 / STEP_S))]
+    added = np.asarray([(s.vx, s.vy, s.vz, s.wz) for s in each]).reshape(10, 250, 4, 4) - 1.0
+    # At 50 Hz, for four steps each; the mean of 5 s is the drift.
+    assert np.array_equal(added, added[:, :, :1] * np.ones((1, 1, 4, 1)))
+    wanders = added.mean(axis=(1, 2))
+    assert np.std(added - wanders[:, None, None]) == pytest.approx(noise / 3**0.5, rel=0.03)
+    assert np.std(wanders) == pytest.approx(drift / 3**0.5, rel=0.3)
+    assert np.abs(added).max() <= noise + drift
+
+
+@settings(max_examples=8, deadline=None)
+@given(plan=st.lists(sticks, min_size=1, max_size=6))
+@example(plan=[FULL] * 6)
+@example(plan=[FULL, DIVE] * 3)
+def test_a_rover_keeps_to_its_speeds_and_its_mirror_image(plan: list[Sticks]) -> None:
+    def driven(side: float) -> list[BodyState]:
+        settings_ = {"command_noise": 0.0, "renderer": "none"}
+        simulation = Simulation(Config(world="empty", plant="rover", **settings_))
+        states: list[BodyState] = []
+        for each in plan:
+            mirrored = Sticks(each.vx, side * each.vy, each.vz, side * each.wz)
+            states += fly(simulation, PLAN_S, mirrored)[0]
+        simulation.close()
+        return states
+
+    states = driven(1.0)
+    for state in states:
+        assert math.hypot(*state.velocity_mps[:2]) < 1.05 * FORWARD_MPS
+        assert abs(state.angular_velocity_radps[2]) < 1.05 * TURN_RADPS
+        assert abs(state.position_m[2] - states[0].position_m[2]) < 0.01
+        assert state.tilt_rad < 0.02
+    path, mirrored = (np.asarray([s.position_m for s in each]) for each in (states, driven(-1.0)))
+    assert np.allclose(path, mirrored * (1.0, -1.0, 1.0), atol=1e-3)
 
 
 @plants
