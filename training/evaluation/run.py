@@ -133,16 +133,16 @@ class Evaluation:
             return made
 
         for name in self._order.models:
-            if name in self._not_run:
+            mark = self._marks.classifier(name)
+            is_kept = self._cache.find(mark, name, seed) is not None
+            if name in self._not_run or (is_kept and name != OURS):
                 continue
             try:
                 fresh = contender(name)
             except ModuleNotFoundError as error:
                 self._not_run[name] = f"{error.name} is not installed"
                 continue
-            mark = self._marks.classifier(name)
             path = self._models / f"{name}-{seed}.onnx"
-            is_kept = self._cache.find(mark, name, seed) is not None
             if isinstance(fresh, Ours) and is_kept:
                 # Its other questions are asked of the weights.
                 is_kept = _loaded(fresh, path)
