@@ -54,13 +54,13 @@ class Build:
 
 
 def _ring(x: float, y: float) -> Body:
-    return Body("cylinder", (0.26, 0.26, 0.05), (x, y, 0.02), _UPRIGHT, "foliage")
+    return Body("cylinder", (0.26, 0.26, 0.05), (x, y, 0.02), _UPRIGHT, "asphalt")
 
 
 ARDRONE = Build(
     MASS_KG,
     INERTIA_KGM2,
-    hull=(Body("box", HULL_M, (0.0, 0.0, 0.0), _UPRIGHT, "foliage"),),
+    hull=(Body("box", HULL_M, (0.0, 0.0, 0.0), _UPRIGHT, "asphalt"),),
     look=(
         Body("box", (0.44, 0.12, 0.09), (0.02, 0.0, 0.0), _UPRIGHT, "container"),
         *(_ring(x, y) for x in (-0.13, 0.13) for y in (-0.13, 0.13)),

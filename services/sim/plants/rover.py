@@ -45,7 +45,7 @@ def _foot(x: float, y: float) -> Body:
 
 
 def _wheel(x: float, y: float) -> Body:
-    return Body("cylinder", (0.2, 0.2, 0.05), (x, y, -0.025), _AXLE_ACROSS, "post")
+    return Body("cylinder", (0.2, 0.2, 0.05), (x, y, -0.025), _AXLE_ACROSS, "asphalt")
 
 
 class RoverPlant(Plant):

@@ -7,7 +7,7 @@ from flights import command
 
 from common.clock import ManualClock
 from common.memory_bus import MemoryBus, MemoryNetwork
-from common.messages import ResetRequest, encode
+from common.messages import Pose, ResetRequest, decode, encode
 from common.node import Node
 from common.topics import key_of
 from services.sim.body import Sticks
@@ -72,3 +72,30 @@ def test_a_reset_is_granted_while_it_waits() -> None:
         handler = next(s.handler for s in node._servers if s.query.name == "sim/reset")
         assert handler(request, 0).world == "empty"
         assert heard["truth"] == []
+
+
+def test_with_several_vehicles_physics_waits_for_the_command_of_each() -> None:
+    config = Config(clock="lockstep", renderer="none", vehicles="tum,mule=rover", world="empty")
+    with stage(config) as (node, _, heard):
+        ask = MemoryBus(node.bus._network)  # type: ignore[attr-defined]
+        mule: list[bytes] = []
+        ask.subscribe(key_of("mule", "truth"), mule.append)
+        first, second = (
+            ask.publication(key_of(name, "command"), None, "")  # type: ignore[arg-type]
+            for name in ("unit", "mule")
+        )
+        for _ in range(5):
+            first.put(encode(command(Sticks())))
+            node.spin()
+        assert heard["truth"] == mule == []
+        for _ in range(2):
+            second.put(encode(command(Sticks(vx=1.0))))
+            node.spin()
+        # Each pair of commands is that of 20 ms.
+        assert (len(heard["truth"]), len(mule)) == (4, 4)
+        for _ in range(10):
+            second.put(encode(command(Sticks(vx=1.0))))
+        node.spin()
+        assert (len(heard["truth"]), len(mule)) == (10, 10)
+        assert decode(mule[-1], Pose).velocity[0] > 0.1
+        assert abs(decode(heard["truth"][-1], Pose).velocity[0]) < 1e-3

@@ -1,0 +1,138 @@
+"""A vehicle is one file: put into the folder it is listed, flown, and known to the autopilot."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flights import fly
+
+from common.messages import ResetRequest
+from services.autopilot.config import Config as AutopilotConfig
+from services.autopilot.core import Autopilot
+from services.autopilot.plants import plant_of
+from services.sim import plants
+from services.sim.body import Sticks
+from services.sim.config import Config
+from services.sim.core import Simulation
+from studies.lockstep import HandsOff, Lockstep
+
+FILE = '''
+"""A heavy camera drone that follows its stick by a first-order lag in every axis."""
+
+from typing import ClassVar
+
+from services.sim.body import GRAVITY_MPS2, NO_LOADS, BodyState, Loads, Sticks, Vector3
+from services.sim.build import Build
+from services.sim.plant import Plant
+from worlds import Body
+
+MASS_KG = 4.0
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+class HeavyPlant(Plant):
+    build = Build(
+        MASS_KG,
+        (0.1, 0.1, 0.18),
+        hull=(Body("cylinder", (0.9, 0.9, 0.3), (0.0, 0.0, 0.0), UPRIGHT, "metal"),),
+        look=(Body("cylinder", (0.9, 0.9, 0.3), (0.0, 0.0, 0.0), UPRIGHT, "metal"),),
+    )
+    life_s = 1500.0
+    full_stick = (3.0, 3.0, 1.0, 1.0, 1.2)
+    rates = (1.5, 2.0, 3.0)
+
+    def __init__(self, step_s: float) -> None:
+        pass
+
+    def restart(self) -> None:
+        pass
+
+    def fly(self, sticks: Sticks, state: BodyState, wind_mps: Vector3, below_m: float) -> Loads:
+        r, (vx, vy, vz) = state.rotation, state.velocity_mps
+        ahead, left = 3.0 * sticks.vx, 3.0 * sticks.vy
+        east, north = r[0] * ahead - r[3] * left, r[3] * ahead + r[0] * left
+        up, down = self.full_stick[2:4]
+        climb = (up if sticks.vz > 0.0 else down) * sticks.vz
+        rates = state.to_body(state.angular_velocity_radps)
+        torque = (-0.5 * rates[0], -0.5 * rates[1], 0.18 * 3.0 * (sticks.wz - rates[2]))
+        push = (MASS_KG * 1.5 * (east - vx), MASS_KG * 1.5 * (north - vy), 0.0)
+        return Loads(MASS_KG * (GRAVITY_MPS2 + 2.0 * (climb - vz)), torque, push)
+
+    def take_off(self, state: BodyState, wind_mps: Vector3, below_m: float) -> Loads:
+        return self.fly(Sticks(vz=1.0), state, wind_mps, below_m)
+
+    def land(self, state: BodyState, wind_mps: Vector3, below_m: float) -> Loads:
+        return self.fly(Sticks(vz=-0.3), state, wind_mps, below_m)
+
+    def fall(self, state: BodyState, wind_mps: Vector3) -> Loads:
+        return NO_LOADS
+
+
+PLANT = HeavyPlant
+'''
+
+
+@pytest.fixture
+def heavy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    (tmp_path / "heavy.py").write_text(FILE)
+    monkeypatch.setattr(plants, "__path__", [*plants.__path__, str(tmp_path)])
+    return "heavy"
+
+
+def test_it_is_listed_and_flies_by_its_own_figures(heavy: str) -> None:
+    assert heavy in plants.names()
+    simulation = Simulation(Config(world="empty", plant=heavy, sensor_noise=0.0))
+    assert simulation.state.position_m[2] == pytest.approx(0.15)
+    fly(simulation, 2.0, action="takeoff")
+    assert simulation.status().state == "flying"
+    states, _ = fly(simulation, 4.0, Sticks(vx=0.5))
+    speed = np.asarray([state.velocity_mps[0] for state in states])
+    assert speed[-1] == pytest.approx(1.5, rel=0.02)
+    assert np.interp(0.632 * speed[-1], speed, np.arange(len(speed)) / 200.0) == pytest.approx(
+        1.0 / 1.5, rel=0.05
+    )
+    fly(simulation, 4.0, action="land")
+    assert simulation.status().state == "landed"
+    simulation.close()
+
+
+def test_it_stands_beside_others_and_comes_by_a_reset(heavy: str) -> None:
+    simulation = Simulation(Config(world="empty", vehicles=f"tum,{heavy}"))
+    assert [actor.plant_name for actor in simulation.actors] == ["tum", heavy]
+    assert simulation.reset(ResetRequest(plant=heavy, position=(3.0, 0.0, 0.0))).plant == heavy
+    simulation.close()
+
+
+def test_the_autopilot_holds_its_place_by_what_it_says_of_itself(heavy: str) -> None:
+    simulation = Simulation(Config(world="empty", plant=heavy, sensor_noise=0.0))
+    assert plant_of(simulation.status()) is not None
+    lockstep = Lockstep(simulation, HandsOff(), autopilot=Autopilot(AutopilotConfig(), 0))
+    lockstep.run(0.5)
+    assert lockstep.decide("takeoff").ok
+    lockstep.run(6.0)
+    assert simulation.status().state == "flying"
+    place = simulation.state.position_m
+    lockstep.run(4.0)
+    assert simulation.state.position_m == pytest.approx(place, abs=0.1)
+    simulation.close()
+
+
+def test_the_autopilot_leaves_a_rover_to_its_operator() -> None:
+    simulation = Simulation(Config(world="empty", plant="rover"))
+    autopilot = Autopilot(AutopilotConfig(), 0)
+    lockstep = Lockstep(simulation, HandsOff(), autopilot=autopilot)
+    lockstep.run(1.0)
+    assert plant_of(simulation.status()) is None
+    answer = lockstep.decide("takeoff")
+    assert (answer.ok, answer.reason) == (False, "flying")
+    answer = lockstep.decide("accept", 1)
+    assert (answer.ok, answer.reason) == (False, "plant")
+    assert lockstep.decide("emergency").ok
+    lockstep.run(0.5)
+    # It stands still, so it is parked at once, and let go by a take-off.
+    assert simulation.status().state == "landed"
+    assert lockstep.decide("takeoff").ok
+    lockstep.run(0.2)
+    assert simulation.status().state == "flying"
+    assert autopilot.mode == "hover"
+    simulation.close()
