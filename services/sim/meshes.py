@@ -12,6 +12,8 @@ from common.frames import Array
 from worlds import Strip
 
 _CYLINDER_SIDES, _SPHERE_RINGS = 12, 10
+_RIM_RAD = 1.2
+"""Below the horizon; from high up the ground ends before it."""
 
 
 def box() -> Array:
@@ -77,11 +79,11 @@ def sphere() -> Array:
 
 
 def dome() -> Array:
-    """The upper half of a sphere seen from inside: position, uv; a little below the horizon too."""
+    """The upper half of a sphere seen from inside, and its rim far down: position, uv."""
     rings, sides = 12, 48
 
     def point(ring: int, side: int) -> tuple[float, ...]:
-        rise = math.pi / 2.0 * max(ring, -1) / rings
+        rise = math.pi / 2.0 * ring / rings if ring >= 0 else -_RIM_RAD
         turn = 2.0 * math.pi * side / sides
         level = math.cos(rise)
         v = 1.0 - max(ring, 0) / rings

@@ -98,32 +98,56 @@ void main() {
 }
 """
 
+# `at` is the place on the ground, world, in m: the texture and the light both lie flat on it.
 GROUND_VERTEX = """
 #version 330
 uniform mat4 from_world;
-uniform vec4 window;
 uniform float height_m;
-in vec2 in_position; in vec2 in_uv;
-out vec2 uv; out vec2 light_uv;
+in vec2 in_position;
+out vec2 at;
 void main() {
-    uv = in_uv;
-    light_uv = (in_position - window.xy) * window.zw;
+    at = in_position;
     gl_Position = from_world * vec4(in_position, height_m, 1.0);
 }
 """
-GROUND_FRAGMENT = f"""{_HEAD}{_HAZE}
-uniform sampler2DArray textures;
+_LIT = """
 uniform sampler2D light;
+uniform vec4 window;
+in vec2 at;
+float lit() { return texture(light, (at - window.xy) * window.zw).r * 1.25; }
+"""
+GROUND_FRAGMENT = f"""{_HEAD}{_HAZE}{_LIT}
+uniform sampler2DArray textures;
 uniform float layer;
-uniform vec3 tint;
-uniform float dash_m;
-in vec2 uv; in vec2 light_uv;
+uniform vec2 per_m;
 out vec4 bgra;
 void main() {{
-    if (dash_m > 0.0 && fract(uv.x / (2.0 * dash_m)) > 0.5) discard;
-    vec3 colour = tint * texture(light, light_uv).r * 1.25;
-    if (layer >= 0.0) colour *= texture(textures, vec3(uv, layer)).rgb;
-    bgra = vec4(hazy(colour).bgr, 1.0);
+    vec3 colour = texture(textures, vec3(at * per_m, layer)).rgb;
+    bgra = vec4(hazy(colour * lit()).bgr, 1.0);
+}}
+"""
+
+# Apart from textures, since `discard` makes all that a program draws dearer.
+PAINT_VERTEX = """
+#version 330
+uniform mat4 from_world;
+uniform float height_m;
+in vec2 in_position; in float in_along_m;
+out vec2 at; out float along_m;
+void main() {
+    at = in_position;
+    along_m = in_along_m;
+    gl_Position = from_world * vec4(in_position, height_m, 1.0);
+}
+"""
+PAINT_FRAGMENT = f"""{_HEAD}{_HAZE}{_LIT}
+uniform vec3 tint;
+uniform float dash_m;
+in float along_m;
+out vec4 bgra;
+void main() {{
+    if (dash_m > 0.0 && fract(along_m / (2.0 * dash_m)) > 0.5) discard;
+    bgra = vec4(hazy(tint * lit()).bgr, 1.0);
 }}
 """
 

@@ -326,9 +326,10 @@ def patches() -> Picture:
 
 
 def sky(generator: np.random.Generator | None = None) -> Picture:
-    """The sky as a (256, 1024, 3) picture: all round across, zenith on top, below it the horizon.
+    """The sky as a (1024, 4096, 4) picture: all round across, zenith on top, below it the horizon.
 
-    A ridge of hills stands on the horizon, the same after a full turn.
+    A ridge of hills stands on the horizon, the same after a full turn. Enlarged here, once, so that
+    a pixel needs no more than the nearest one.
     """
     generator = generator or np.random.default_rng(_SEED)
     height, width = 256, 1024
@@ -346,4 +347,6 @@ def sky(generator: np.random.Generator | None = None) -> Picture:
             ridge += base / wave**0.9 * 0.5 * np.sin(wave * angle + generator.uniform(0, 6.28))
         below = up[:, :, 0] < np.maximum(ridge, 0.008)[None, :]
         colour[below] = tint
-    return np.asarray(np.clip(colour * 255.0, 0.0, 255.0), np.uint8)
+    small = np.asarray(np.clip(colour * 255.0, 0.0, 255.0), np.uint8)
+    large = cv2.resize(small, (4 * width, 4 * height), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(cv2.cvtColor(large, cv2.COLOR_RGB2RGBA), np.uint8)

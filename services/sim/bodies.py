@@ -1,0 +1,169 @@
+"""Bodies that are drawn as instances: one draw a shape and kind, of what is in sight."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from common.frames import Array
+from services.sim import meshes, shaders
+from worlds import Body, Texture
+
+SEE_THROUGH = frozenset({"fence"})
+"""Textures with holes; they are drawn last."""
+MOST_FIGURES = 256
+"""Bodies of vehicles of one shape that are drawn at once."""
+_COLUMNS = 11
+_LAYOUT = "3f 4f 3f 1f/i"
+_SIDES = np.asarray([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
+
+
+class Bodies:
+    """What stands in the world, and the vehicles that move in it.
+
+    Args:
+        gl: where they are drawn.
+        layers: the layer of each texture.
+        extent_m: what one repetition of each layer measures, (N, 2).
+    """
+
+    def __init__(self, gl: Any, layers: dict[Texture, int], extent_m: Array) -> None:
+        self._gl = gl
+        self._layers = layers
+        self.program = gl.program(shaders.BODY_VERTEX, shaders.BODY_FRAGMENT)
+        self._shadow_program = gl.program(shaders.SHADOW_VERTEX, shaders.SHADOW_FRAGMENT)
+        for program in (self.program, self._shadow_program):
+            program["extent"] = [tuple(each) for each in extent_m]
+        self._meshes = {
+            "box": gl.buffer(meshes.box().tobytes()),
+            "cylinder": gl.buffer(meshes.cylinder().tobytes()),
+            "sphere": gl.buffer(meshes.sphere().tobytes()),
+        }
+        self._figures = {}
+        for shape in self._meshes:
+            buffer = gl.buffer(reserve=MOST_FIGURES * _COLUMNS * 4, dynamic=True)
+            self._figures[shape] = (buffer, self._drawn(shape, buffer))
+        self._scene_objects: list[Any] = []
+
+    def load(self, bodies: Sequence[Body]) -> None:
+        """Draw these from now on."""
+        for each in self._scene_objects:
+            each.release()
+        self._scene_objects = []
+        self._flocks: list[_Flock] = []
+        self._panes: list[_Flock] = []
+        tables = [np.empty((0, _COLUMNS), "f4")]
+        begin = 0
+        for flocks, is_pane in ((self._flocks, False), (self._panes, True)):
+            for shape in self._meshes:
+                alike = [
+                    body
+                    for body in bodies
+                    if body.shape == shape and (body.texture in SEE_THROUGH) == is_pane
+                ]
+                if not alike:
+                    continue
+                table = self._table(alike)
+                buffer = self._gl.buffer(table.tobytes(), dynamic=True)
+                drawn, shadow = self._drawn(shape, buffer), self._shadowing(shape, buffer)
+                rows = slice(begin, begin + len(table))
+                flocks.append(_Flock(table, rows, buffer, drawn, shadow))
+                self._scene_objects += [drawn, shadow, buffer]
+                tables.append(table)
+                begin += len(table)
+        whole = np.concatenate(tables).astype(np.float64)
+        self._centres_m = whole[:, :3]
+        self._radii_m = 0.5 * np.linalg.norm(whole[:, 7:10], axis=1)
+
+    def cast_shadows(self, window: Array) -> None:
+        """Draw the shadows into a window of the ground; the textures are in use at place 0."""
+        self._shadow_program["window"] = tuple(window)
+        for flock in self._flocks + self._panes:
+            flock.shadow.render(instances=len(flock.table))
+
+    def look(self, eye: Array, from_world: Array) -> Array:
+        """How far each body is from the eye, (N,); infinitely if it is out of sight."""
+        # A plane of the view's pyramid is a sum of rows of the matrix; its normal is not of unit.
+        sides = from_world[3] + _SIDES @ from_world[:2]
+        lengths = np.linalg.norm(sides[:, :3], axis=1)
+        inside = (self._centres_m @ sides[:, :3].T + sides[:, 3]) / lengths
+        seen = (inside > -self._radii_m[:, None]).all(axis=1)
+        return np.where(seen, np.linalg.norm(self._centres_m - eye, axis=1), np.inf)
+
+    def draw_opaque(self, away_m: Array, figures: Sequence[Body]) -> None:
+        """Draw what has no holes, near to far, so that what is hidden is not painted.
+
+        Args:
+            away_m: of each body, see `look`.
+            figures: bodies that move; they cast no shadows.
+        """
+        for flock in self._flocks:
+            flock.draw(away_m, 1)
+        for shape, (buffer, vertices) in self._figures.items():
+            alike = [body for body in figures if body.shape == shape]
+            for begin in range(0, len(alike), MOST_FIGURES):
+                some = alike[begin : begin + MOST_FIGURES]
+                buffer.orphan()
+                buffer.write(self._table(some).tobytes())
+                vertices.render(instances=len(some))
+
+    def draw_panes(self, away_m: Array) -> None:
+        """Draw what has holes, far to near, so that nets are seen through nets."""
+        for pane in self._panes:
+            pane.draw(away_m, -1)
+
+    def _table(self, bodies: Sequence[Body]) -> Array:
+        """One row a body: place, turn, size, layer."""
+        rows = [
+            (*body.position_m, *body.orientation, *body.size_m, self._layers[body.texture])
+            for body in bodies
+        ]
+        return np.asarray(rows, "f4").reshape(-1, _COLUMNS)
+
+    def _drawn(self, shape: str, table: Any) -> Any:
+        names = ("in_position", "in_normal", "in_uv", "in_across", "in_up")
+        return self._gl.vertex_array(
+            self.program,
+            [
+                (self._meshes[shape], "3f 3f 2f 3f 3f", *names),
+                (table, _LAYOUT, "at", "turn", "size", "layer"),
+            ],
+        )
+
+    def _shadowing(self, shape: str, table: Any) -> Any:
+        names = ("in_position", "in_uv", "in_across", "in_up")
+        return self._gl.vertex_array(
+            self._shadow_program,
+            [
+                (self._meshes[shape], "3f 3x4 2f 3f 3f", *names),
+                (table, _LAYOUT, "at", "turn", "size", "layer"),
+            ],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Flock:
+    """Bodies of one shape, drawn at once: a row of the table each, and its copy in OpenGL.
+
+    Attributes:
+        table: see `Bodies._table`.
+        rows: which of all bodies they are.
+        buffer: the table's copy.
+        vertices: draws it.
+        shadow: draws its shadows.
+    """
+
+    table: Array
+    rows: slice
+    buffer: Any
+    vertices: Any
+    shadow: Any
+
+    def draw(self, away_m: Array, order: int) -> None:
+        """Draw those in sight, the nearest first (order 1) or last (-1)."""
+        away_m = away_m[self.rows]
+        nearest = np.argsort(away_m)[: np.count_nonzero(np.isfinite(away_m))]
+        if len(nearest):
+            self.buffer.write(self.table[nearest[::order]].tobytes())
+            self.vertices.render(instances=len(nearest))

@@ -1,0 +1,139 @@
+"""The ground: its textures, the paint on it, and the light that falls on it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from common.frames import Array
+from services.sim import meshes, shaders
+from services.sim.stage import Scene
+from services.sim.textures import patches
+from worlds import Strip, Texture
+
+PAINT_M = 0.003
+"""Of each layer of paint, so that the upper hides the lower."""
+SIDE_M = 600.0
+LIGHT_PIXELS = 4096
+"""1 to 2 cm each where a world is 60 m wide, so that the nearest one is enough: to blend four costs
+a quarter of the ground."""
+
+
+class Ground:
+    """A plane with layers of paint, in the light of the sun.
+
+    Args:
+        gl: where it is drawn.
+        layers: the layer of each texture.
+        extent_m: what one repetition of each layer measures, (N, 2).
+    """
+
+    def __init__(self, gl: Any, layers: dict[Texture, int], extent_m: Array) -> None:
+        self._gl = gl
+        self._layers, self._extent_m = layers, extent_m
+        self.textured = gl.program(shaders.GROUND_VERTEX, shaders.GROUND_FRAGMENT)
+        self.painted = gl.program(shaders.PAINT_VERTEX, shaders.PAINT_FRAGMENT)
+        for program in (self.textured, self.painted):
+            program["light"] = 1
+        # OpenGL's texture of one channel.
+        pixels = patches()
+        self._patches = gl.texture(pixels.shape[1::-1], 1, pixels.tobytes())
+        corners = np.asarray([(-1, -1), (1, -1), (-1, 1), (1, 1)], "f4")
+        self._patches_all_over = gl.vertex_array(
+            gl.program(shaders.PATCHES_VERTEX, shaders.PATCHES_FRAGMENT),
+            [(gl.buffer(corners.tobytes()), "2f", "corner")],
+        )
+        self._scene_objects: list[Any] = []
+
+    def load(self, scene: Scene, cast_shadows: Callable[[Array], None]) -> None:
+        """Draw the ground of this scene from now on.
+
+        Args:
+            scene: what stands on it, and what is painted on it.
+            cast_shadows: draws the scene's shadows into a window of the ground (its corner, and 1
+                over its sides).
+        """
+        for each in self._scene_objects:
+            each.release()
+        self._scene_objects = []
+        self._load_light(_window_of(scene), cast_shadows)
+        half = SIDE_M / 2.0
+        corners = np.asarray([(-half, -half), (half, -half), (-half, half), (half, half)])
+        layers_up = [self._laid(corners, scene.ground)]
+        for strip in scene.strips:
+            points, along_m = meshes.ribbon(strip)
+            if strip.texture is None:
+                layers_up.append(self._dabbed(points, along_m, strip))
+            else:
+                layers_up.append(self._laid(points, strip.texture))
+        # Top paint first and a little higher, so that it hides what is under it from painting.
+        self._layers_down = [(PAINT_M * up, each) for up, each in enumerate(layers_up)][::-1]
+
+    def draw(self) -> None:
+        """Draw it; the textures are in use at place 0."""
+        self._light.use(1)
+        for height_m, (program, vertices, look) in self._layers_down:
+            program["height_m"] = height_m
+            for name, value in look.items():
+                program[name] = value
+            vertices.render(moderngl.TRIANGLE_STRIP)
+
+    def _load_light(self, window: Array, cast_shadows: Callable[[Array], None]) -> None:
+        """Paint the sun's shadows, and patches of light that hide the textures' repetition.
+
+        Once is enough, since nothing that casts a shadow moves.
+        """
+        gl = self._gl
+        self._light = gl.texture((LIGHT_PIXELS, LIGHT_PIXELS), 1)
+        target = gl.framebuffer([self._light])
+        target.use()
+        gl.enable_only(moderngl.NOTHING)
+        self._patches.use(0)
+        self._patches_all_over.render(moderngl.TRIANGLE_STRIP)
+        gl.enable(moderngl.BLEND)
+        gl.blend_equation = moderngl.MIN
+        cast_shadows(window)
+        gl.blend_equation = moderngl.FUNC_ADD
+        target.release()
+        self._light.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._light.repeat_x = self._light.repeat_y = False
+        for program in (self.textured, self.painted):
+            program["window"] = tuple(window)
+        self._scene_objects.append(self._light)
+
+    def _laid(self, points: Array, texture: Texture) -> tuple[Any, Any, dict[str, Any]]:
+        """A layer of a texture, which lies flat on the world: it bends and stretches nowhere."""
+        layer = self._layers[texture]
+        step_m = np.where(self._extent_m[layer] > 0.0, self._extent_m[layer], 1.0)
+        vertices = self._vertices(self.textured, points, "2f", "in_position")
+        return self.textured, vertices, {"layer": layer, "per_m": tuple(1.0 / step_m)}
+
+    def _dabbed(
+        self, points: Array, along_m: Array, strip: Strip
+    ) -> tuple[Any, Any, dict[str, Any]]:
+        """A layer of plain paint."""
+        data = np.hstack([points, along_m[:, :1]])
+        vertices = self._vertices(self.painted, data, "2f 1f", "in_position", "in_along_m")
+        return self.painted, vertices, {"tint": strip.colour, "dash_m": strip.dash_m or 0.0}
+
+    def _vertices(self, program: Any, data: Array, layout: str, *names: str) -> Any:
+        buffer = self._gl.buffer(data.astype("f4").tobytes())
+        vertices = self._gl.vertex_array(program, [(buffer, layout, *names)])
+        self._scene_objects += [vertices, buffer]
+        return vertices
+
+
+def _window_of(scene: Scene) -> Array:
+    """What holds all bodies and their shadows: a corner (x, y), and 1 over its sides."""
+    east, north = -shaders.SUN[0] / shaders.SUN[2], -shaders.SUN[1] / shaders.SUN[2]
+    reach = [
+        (x + side * size + east * height, y + side * size + north * height)
+        for body in scene.bodies
+        for x, y, z in [body.position_m]
+        for size in [max(body.size_m)]
+        for height in (0.0, z + size)
+        for side in (1.0, -1.0)
+    ] or [(0.0, 0.0)]
+    low, high = np.min(reach, axis=0) - 1.0, np.max(reach, axis=0) + 1.0
+    return np.concatenate([low, 1.0 / (high - low)])
