@@ -78,7 +78,7 @@ def run_service(
     try:
         if hasattr(wiring, "check"):
             # What can be refused without a network does not wait for one.
-            wiring.check(settings)
+            wiring.check(settings, vehicle)
         bus = open_bus(stop, endpoint, zenoh_config_file)
         if bus is None:
             return 0

@@ -17,7 +17,7 @@ STICKS_WAITING = 64
 _logger = logging.getLogger(__name__)
 
 
-def check(config: Config) -> None:
+def check(config: Config, _vehicle: str) -> None:
     """See that the model can be used, before there is a network to serve.
 
     Raises:

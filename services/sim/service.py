@@ -26,17 +26,22 @@ IDLE_S = 0.5
 LOW_FACTOR = 0.95
 
 
-def wire(node: Node, config: Config) -> None:
-    """Connect the simulator to the node; vehicles but the first get nodes beside it.
+def check(config: Config, vehicle: str) -> None:
+    """See whether the vehicles can have the names that are asked for.
 
     Raises:
-        ConfigError: if the vehicles cannot have the names that are asked for.
+        ConfigError: if they cannot.
     """
-    in_lockstep = config.clock == "lockstep"
     try:
-        names = names_of(crew_of(config.vehicles, config.plant), node.vehicle)
+        names_of(crew_of(config.vehicles, config.plant), vehicle)
     except ValueError as error:
         raise ConfigError(f"vehicles: {error}") from None
+
+
+def wire(node: Node, config: Config) -> None:
+    """Connect the simulator to the node; vehicles but the first get nodes beside it."""
+    in_lockstep = config.clock == "lockstep"
+    names = names_of(crew_of(config.vehicles, config.plant), node.vehicle)
     nodes = [node, *(node.beside(name) for name in names[1:])]
     # Both clocks at once, or stamps would stay behind by what it takes to build the world.
     pace = Pace(node.clock.monotonic_ns())
