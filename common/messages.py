@@ -72,9 +72,15 @@ class Payload(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     def __post_init__(self) -> None:
         for field in self.__struct_fields__:
             value = getattr(self, field)
-            # Vectors, hundreds a second: a sum is finite unless one of its terms is not, or it
-            # overflows, which the close look clears up.
-            if type(value) is tuple and math.isfinite(sum(value)):
+            kind = type(value)
+            # Thousands a second, so the usual kinds are told here. A sum is finite unless one of
+            # its terms is not, or it overflows, which the close look clears up.
+            if (
+                kind is int
+                or kind is str
+                or (kind is float and math.isfinite(value))
+                or (kind is tuple and math.isfinite(sum(value)))
+            ):
                 continue
             _require_finite(value, field)
 
