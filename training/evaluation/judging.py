@@ -24,8 +24,6 @@ from training.windows import examples_of, seen_after
 PERIODS_S = (1.0, 0.1)
 """The longest and the shortest T of the service."""
 
-ODD, CLUMSY = 12, 4
-"""So many unusual people a seed show five performances of each primitive of their own."""
 REPLAYED = 3000
 """So many performances of others are kept in mind meanwhile."""
 DISTORTED = 240
@@ -93,8 +91,8 @@ def hovered(model_path: Path, seed: int, people: int) -> dict[str, Any]:
     return {str(period_s): vars(bothered(model, held, period_s)) for period_s in PERIODS_S}
 
 
-def adapted(ours: Ours, fold: Fold, seed: int) -> list[dict[str, Any]]:
-    """What a few performances of their own do for unusual people, and for the others."""
+def adapted(ours: Ours, fold: Fold, seed: int, odd: int, clumsy: int) -> list[dict[str, Any]]:
+    """What a few performances of their own do for people with odd ways and for clumsy ones."""
     order = np.random.default_rng(seed).permutation(len(fold.lesson.training))
     replay = [fold.lesson.training[place] for place in order[:REPLAYED]]
     study = adaptation_study(
@@ -102,7 +100,7 @@ def adapted(ours: Ours, fold: Fold, seed: int) -> list[dict[str, Any]]:
         examples_of(replay),
         examples_of(fold.tests[KNOWN]),
         seed,
-        ODD,
-        CLUMSY,
+        odd,
+        clumsy,
     )
     return [vars(person) for person in study]

@@ -74,7 +74,7 @@ class Asked:
         monkeypatch.setattr(run, "judge", answers("judge", {"fit_s": 1.0}))
         monkeypatch.setattr(run, "hovered", lambda *_: answers("hover", {"1.0": {}})(None))
         monkeypatch.setattr(
-            run, "adapted", lambda _, made, seed: answers("adapt", [{"own_before": 0.5}])(None)
+            run, "adapted", lambda *_: answers("adapt", [{"own_before": 0.5}])(None)
         )
         monkeypatch.setattr(run, "judge_human", lambda one, *_: answers("human", {"n": 1.0})(one))
         monkeypatch.setattr(run, "machine_f1", lambda *_: 0.8)
