@@ -68,7 +68,7 @@ def test_adapting_is_seeded_and_leaves_what_sticks_draw_alone(
     fitted: Fitted, others: Examples, ana: list[Primitive], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(adapting, "OWN_WEIGHT", 10.0)
-    monkeypatch.setattr(adapting, "STEPS", 60)
+    monkeypatch.setattr(adapting, "LEARNING_RATE", 1e-2)
     one, other = (Adaptation(fitted, others, 2).to(examples_of(ana)) for _ in range(2))
     assert one.of_use
     assert one.after > one.before
@@ -98,7 +98,7 @@ class _Recorder:
     shown: list[Examples]
 
     def __init__(self, fitted: Fitted, _others: Examples, _seed: int) -> None:
-        self._adapted = replace(fitted, temperature=2.0)
+        self._adapted = replace(fitted, confidence_min=0.5)
         self._fitted = fitted
         _Recorder.shown = []
 
@@ -115,11 +115,11 @@ def test_the_study_judges_on_performances_of_the_same_person_that_were_not_shown
 
     def f1_of(network: Fitted, examples: Examples) -> float:
         asked.append((network, examples))
-        return 0.25 * network.temperature
+        return 0.5 if network.confidence_min == 0.5 else 0.25
 
     monkeypatch.setattr(studying, "Adaptation", _Recorder)
     monkeypatch.setattr(studying, "f1_of", f1_of)
-    still = replace(fitted, temperature=1.0)
+    still = replace(fitted, confidence_min=0.4)
     found = adaptation_study(still, others, others, 4, odd=2, clumsy=1)
     assert [one.kind for one in found] == ["odd", "odd", "clumsy"]
     assert len({(one.kind, one.operator) for one in found}) == 3
