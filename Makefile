@@ -105,6 +105,9 @@ picture: setup $(VENV)/.all ## the README's picture anew: flies the demo and pho
 shapes: $(VENV)/.all ## the figure of what is suggested
 	$(BIN)/python docs/shapes.py
 
+vehicles: $(VENV)/.all ## the docs' picture of several vehicles
+	$(BIN)/python -P docs/vehicles.py
+
 lock: $(BIN)/python ## renew constraints.txt to the newest versions that fit pyproject.toml
 	$(BIN)/python -m pip install --quiet pip-tools
 	$(BIN)/pip-compile --quiet --all-extras --strip-extras --upgrade --no-header --no-annotate \

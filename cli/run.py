@@ -1,7 +1,11 @@
 """`autocomplete run SERVICE`: one service, anywhere."""
 
 import argparse
+import ast
 import dataclasses
+import inspect
+import itertools
+import textwrap
 from collections.abc import Sequence
 
 from cli import options as opts
@@ -20,15 +24,19 @@ def declare(parser: argparse.ArgumentParser) -> None:
     fields: list[str] = []
     if service is not None:
         group = parser.add_argument_group(f"configuration of {service}")
+        meanings = _meanings_in(config_type_of(service))
         for field in dataclasses.fields(config_type_of(service)):
             flag = "--" + field.name.replace("_", "-")
             group.add_argument(
-                flag, dest=f"set_{field.name}", metavar="VALUE", help=f"({field.default})"
+                flag,
+                dest=f"set_{field.name}",
+                metavar="VALUE",
+                help=f"{meanings.get(field.name, '')} ({field.default})".strip().replace("%", "%%"),
             )
             fields.append(field.name)
     opts.add_examples(
         parser,
-        "autocomplete run sim --camera-fps 15",
+        "autocomplete run sim --vehicles 3",
         "autocomplete run overlay --connect tcp/192.168.1.20:7447",
         "autocomplete run operator --config system.toml",
         "autocomplete run localizer --help     # with its configuration",
@@ -42,6 +50,19 @@ def _service_in(words: Sequence[str]) -> str | None:
         if word in SERVICES and not (before.startswith("--") and "=" not in before):
             return word
     return None
+
+
+def _meanings_in(config_type: type) -> dict[str, str]:
+    """What the strings below its fields say of them."""
+    (class_,) = ast.parse(textwrap.dedent(inspect.getsource(config_type))).body
+    assert isinstance(class_, ast.ClassDef)
+    meanings = {}
+    for field, below in itertools.pairwise(class_.body):
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+            match below:
+                case ast.Expr(ast.Constant(str(text))):
+                    meanings[field.target.id] = " ".join(text.split())
+    return meanings
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -18,7 +18,7 @@ class Config:
     world: str = "track"
     """Where it starts: one of `autocomplete worlds`, or the path of a YAML file like those."""
     plant: str = "tum"
-    """What the vehicle is, and so how it follows the stick: the name of a file in `plants`."""
+    """What the vehicle is: tum, ardrone, rover, or a file of your own in services/sim/plants."""
     vehicles: str = "1"
     """How many share the world; or a plant for each, as tum,ardrone,rover; NAME=PLANT names it."""
     seed: int = 0

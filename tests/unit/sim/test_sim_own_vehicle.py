@@ -1,4 +1,4 @@
-"""A vehicle is one file: put into the folder it is listed, flown, and known to the autopilot."""
+"""A vehicle is one file, here the one of the docs: listed, flown, and known to the autopilot."""
 
 from pathlib import Path
 
@@ -16,65 +16,14 @@ from services.sim.config import Config
 from services.sim.core import Simulation
 from studies.lockstep import HandsOff, Lockstep
 
-FILE = '''
-"""A heavy camera drone that follows its stick by a first-order lag in every axis."""
-
-from typing import ClassVar
-
-from services.sim.body import GRAVITY_MPS2, NO_LOADS, BodyState, Loads, Sticks, Vector3
-from services.sim.build import Build
-from services.sim.plant import Plant
-from worlds import Body
-
-MASS_KG = 4.0
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-
-
-class HeavyPlant(Plant):
-    build = Build(
-        MASS_KG,
-        (0.1, 0.1, 0.18),
-        hull=(Body("cylinder", (0.9, 0.9, 0.3), (0.0, 0.0, 0.0), UPRIGHT, "metal"),),
-        look=(Body("cylinder", (0.9, 0.9, 0.3), (0.0, 0.0, 0.0), UPRIGHT, "metal"),),
-    )
-    life_s = 1500.0
-    full_stick = (3.0, 3.0, 1.0, 1.0, 1.2)
-    rates = (1.5, 2.0, 3.0)
-
-    def __init__(self, step_s: float) -> None:
-        pass
-
-    def restart(self) -> None:
-        pass
-
-    def fly(self, sticks: Sticks, state: BodyState, wind_mps: Vector3, below_m: float) -> Loads:
-        r, (vx, vy, vz) = state.rotation, state.velocity_mps
-        ahead, left = 3.0 * sticks.vx, 3.0 * sticks.vy
-        east, north = r[0] * ahead - r[3] * left, r[3] * ahead + r[0] * left
-        up, down = self.full_stick[2:4]
-        climb = (up if sticks.vz > 0.0 else down) * sticks.vz
-        rates = state.to_body(state.angular_velocity_radps)
-        torque = (-0.5 * rates[0], -0.5 * rates[1], 0.18 * 3.0 * (sticks.wz - rates[2]))
-        push = (MASS_KG * 1.5 * (east - vx), MASS_KG * 1.5 * (north - vy), 0.0)
-        return Loads(MASS_KG * (GRAVITY_MPS2 + 2.0 * (climb - vz)), torque, push)
-
-    def take_off(self, state: BodyState, wind_mps: Vector3, below_m: float) -> Loads:
-        return self.fly(Sticks(vz=1.0), state, wind_mps, below_m)
-
-    def land(self, state: BodyState, wind_mps: Vector3, below_m: float) -> Loads:
-        return self.fly(Sticks(vz=-0.3), state, wind_mps, below_m)
-
-    def fall(self, state: BodyState, wind_mps: Vector3) -> Loads:
-        return NO_LOADS
-
-
-PLANT = HeavyPlant
-'''
+PAGE = Path(__file__).parents[3] / "docs" / "simulator.md"
 
 
 @pytest.fixture
 def heavy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    (tmp_path / "heavy.py").write_text(FILE)
+    _, _, page = PAGE.read_text().partition("## A vehicle of your own")
+    code, _, _ = page.partition("```python\n")[2].partition("```\n")
+    (tmp_path / "heavy.py").write_text(code)
     monkeypatch.setattr(plants, "__path__", [*plants.__path__, str(tmp_path)])
     return "heavy"
 
