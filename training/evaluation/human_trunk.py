@@ -21,6 +21,8 @@ from training.network import Trunk
 Array32 = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 
+WIDTH = 48
+"""Channels of the convolutions and units of the GRUs."""
 STEPS = 500
 BATCH = 32
 LEARNING_RATE = 2e-3
@@ -42,10 +44,6 @@ LOUDNESS = 0.2
 MIXING = 0.15
 NOISE = 0.05
 MIXUP = 0.4
-
-VIEWS = ((0.0, 1.0), (0.0, 0.95), (0.05, 1.0))
-"""What is read of a series to be judged: from and to which share of it. Its probabilities are the
-mean over them."""
 
 
 def read(series: Array32, at: NDArray[np.float64]) -> Array32:
@@ -118,16 +116,10 @@ class FittedTrunk:
 
     def probabilities(self, series: Sequence[Array32]) -> Array32:
         """Of each class, (n, classes), for standardised series, each (channels, N)."""
-        return np.stack([self._of(one) for one in series])
-
-    def _of(self, series: Array32) -> Array32:
-        views = [
-            read(series, np.linspace(begin, end, _count(series, self.factor * (end - begin))))
-            for begin, end in VIEWS
-        ]
+        seen = [read(one, np.linspace(0.0, 1.0, _count(one, self.factor))) for one in series]
         with torch.no_grad():
-            said: Array32 = self.network(*_timed(*_batch(views))).softmax(1).mean(0).numpy()
-        return said
+            said = [self.network(*_timed(*_batch([one]))).softmax(1).numpy() for one in seen]
+        return np.concatenate(said)
 
 
 def fit_trunk(
@@ -143,7 +135,7 @@ def fit_trunk(
     rng = np.random.default_rng(seed)
     factor = USUAL_SAMPLES / float(np.median([one.shape[1] for one in training]))
     targets = F.one_hot(torch.from_numpy(labels)).float()
-    network = Trunk(len(training[0]) + 1, targets.shape[1]).train()
+    network = Trunk(len(training[0]) + 1, targets.shape[1], WIDTH).train()
     optimiser = torch.optim.AdamW(network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, LEARNING_RATE, steps, pct_start=WARM_UP_SHARE

@@ -7,6 +7,7 @@ import torch
 
 from training.evaluation.contenders import CODE
 from training.evaluation.folds import Size, shown
+from training.evaluation.human_trunk import WIDTH
 from training.evaluation.names import OURS
 from training.evaluation.sources import code_of
 from training.generator.dataset import THESIS, Population, counts_of, holds, populate
@@ -79,7 +80,7 @@ def of_recordings() -> str:
     """The mark of trainings on recordings of people: their code, and what the trunk computes."""
     with torch.random.fork_rng():
         torch.manual_seed(0)
-        trunk = Trunk(3, 4)
+        trunk = Trunk(3, 4, WIDTH)
         said = trunk(torch.randn(4, 3, 100), torch.ones(4, 1, 100))
     told = np.round(said.detach().numpy(), 3).tobytes()
     code = code_of("training/evaluation/human*.py")
