@@ -15,9 +15,9 @@ from worlds import Strip, Texture
 PAINT_M = 0.003
 """Of each layer of paint, so that the upper hides the lower."""
 SIDE_M = 600.0
-LIGHT_PIXELS = 4096
-"""1 to 2 cm each where a world is 60 m wide, so that the nearest one is enough: to blend four costs
-a quarter of the ground."""
+LIGHT_PIXELS = 2048
+"""2 to 3 cm each where a world is 60 m wide, so that the nearest one is enough: to blend four costs
+a quarter of the ground, and more of them no longer fit in a cache."""
 
 
 class Ground:

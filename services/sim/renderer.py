@@ -136,11 +136,8 @@ class _Target:
 
     def begin(self) -> None:
         """Draw into it from now on."""
-        # Depth only: the sky paints what nothing else does.
-        self._frame.color_mask = (False,) * 4
-        self._frame.clear()
-        self._frame.color_mask = (True,) * 4
         self._frame.use()
+        self._frame.clear()
 
     def read(self) -> Picture:
         """What was drawn (height, width, 3)."""

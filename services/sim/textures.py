@@ -326,10 +326,10 @@ def patches() -> Picture:
 
 
 def sky(generator: np.random.Generator | None = None) -> Picture:
-    """The sky as a (1024, 4096, 4) picture: all round across, zenith on top, below it the horizon.
+    """The sky as a (512, 2048, 4) picture: all round across, zenith on top, below it the horizon.
 
-    A ridge of hills stands on the horizon, the same after a full turn. Enlarged here, once, so that
-    a pixel needs no more than the nearest one.
+    A ridge of hills stands on the horizon, the same after a full turn. Enlarged here, once, so
+    that a pixel needs no more than the nearest one.
     """
     generator = generator or np.random.default_rng(_SEED)
     height, width = 256, 1024
@@ -348,5 +348,5 @@ def sky(generator: np.random.Generator | None = None) -> Picture:
         below = up[:, :, 0] < np.maximum(ridge, 0.008)[None, :]
         colour[below] = tint
     small = np.asarray(np.clip(colour * 255.0, 0.0, 255.0), np.uint8)
-    large = cv2.resize(small, (4 * width, 4 * height), interpolation=cv2.INTER_LINEAR)
+    large = cv2.resize(small, (2 * width, 2 * height), interpolation=cv2.INTER_LINEAR)
     return np.asarray(cv2.cvtColor(large, cv2.COLOR_RGB2RGBA), np.uint8)
