@@ -1,6 +1,7 @@
 """What a kept result follows from: people, windows and code. With another mark it is found anew."""
 
 import hashlib
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -38,7 +39,8 @@ class Marks:
                 population, len(population.families), {**counts_of(0.01), NONE: 6}, 0
             )
         ]
-        people = hashlib.sha256(repr(size).encode())
+        # How long our network learns is its own affair.
+        people = hashlib.sha256(repr(replace(size, budget=0)).encode())
         for one in made:
             people.update(one.family.encode() + one.times_s.tobytes() + one.sticks.tobytes())
         self._people = people.hexdigest()[:16]
@@ -48,10 +50,12 @@ class Marks:
             windows.update(drawn.sticks.tobytes() + drawn.lengths.tobytes())
         self._windows = windows.hexdigest()[:16]
         self._asked = code_of(*QUESTIONS)
+        self._budget = size.budget
 
     def classifier(self, name: str) -> str:
         """Of what a classifier answers."""
-        return f"{self._people} {self._windows} {self._asked} {code_of(*CODE[name])}"
+        budget = f" {self._budget}" if name == OURS else ""
+        return f"{self._people} {self._windows} {self._asked} {code_of(*CODE[name])}{budget}"
 
     def hover(self) -> str:
         """Of what our network suggests to who only holds a place."""
