@@ -80,7 +80,10 @@ class ErrorStateFilter:
         self.covariance[:15, :15] = np.diag(sigmas**2)
         self.key_position_m = position_m.copy()
         self.key_rotation = rotation.copy()
-        self._noise = noise
+        self._white, self._walk = np.zeros(SIZE), np.zeros(SIZE)
+        self._white[VELOCITY], self._white[ROTATION] = noise.accel_mps2**2, noise.gyro_radps**2
+        self._walk[ACCEL_BIAS] = noise.accel_bias_walk_mps2**2
+        self._walk[GYRO_BIAS] = noise.gyro_bias_walk_radps**2
         self._transition = np.eye(SIZE)
         self._steps = 0
         self._past_ns = np.full(_HISTORY, -1, dtype=np.int64)
@@ -110,12 +113,8 @@ class ErrorStateFilter:
         transition[VELOCITY, ACCEL_BIAS] = middle * -dt_s
         transition[ROTATION, GYRO_BIAS] = middle * -dt_s
         self.covariance = transition @ self.covariance @ transition.T
-        noise = self._noise
-        diagonal = np.einsum("ii->i", self.covariance)
-        diagonal[VELOCITY] += (noise.accel_mps2 * dt_s) ** 2
-        diagonal[ROTATION] += (noise.gyro_radps * dt_s) ** 2
-        diagonal[ACCEL_BIAS] += noise.accel_bias_walk_mps2**2 * dt_s
-        diagonal[GYRO_BIAS] += noise.gyro_bias_walk_radps**2 * dt_s
+        diagonal = _diagonal_of(self.covariance)
+        diagonal += (self._white * dt_s + self._walk) * dt_s
         self.stamp_ns = stamp_ns
         self._remember()
 
@@ -191,11 +190,12 @@ class ErrorStateFilter:
         covariance = self.covariance - gain @ cross.T
         self.covariance = 0.5 * (covariance + covariance.T)
         # Rounding may take a variance that is all but zero below it.
-        np.fill_diagonal(self.covariance, np.maximum(self.covariance.diagonal(), 0.0))
+        diagonal = _diagonal_of(self.covariance)
+        np.maximum(diagonal, 0.0, out=diagonal)
 
     def loosen(self, velocity_mps: float, rotation_rad: float = 0.0) -> None:
         """Know velocity and rotation less well, by these sigmas."""
-        diagonal = np.einsum("ii->i", self.covariance)
+        diagonal = _diagonal_of(self.covariance)
         diagonal[VELOCITY] += velocity_mps**2
         diagonal[ROTATION] += rotation_rad**2
 
@@ -221,3 +221,9 @@ class ErrorStateFilter:
         self._past_rotation[slot] = self.rotation
         self._past_rate_radps[slot] = self.rate_radps
         self._steps += 1
+
+
+def _diagonal_of(matrix: Array) -> Array:
+    """A view of it, to be written to."""
+    diagonal: Array = np.einsum("ii->i", matrix)
+    return diagonal

@@ -9,6 +9,8 @@ import numpy as np
 
 from common.frames import Array
 
+_ONE_AND_A_HALF = 1.5 * np.eye(3)
+
 
 def cross_matrix(vector: Array) -> Array:
     """The 3x3 matrix that multiplies like `vector` x."""
@@ -38,7 +40,7 @@ def rotation_by(vector_rad: Array) -> Array:
 
 def orthonormal(rotation: Array) -> Array:
     """A rotation without the rounding errors of many products: one step of Newton's iteration."""
-    return np.asarray(rotation @ (1.5 * np.eye(3) - 0.5 * (rotation.T @ rotation)))
+    return np.asarray(rotation @ (_ONE_AND_A_HALF - 0.5 * (rotation.T @ rotation)))
 
 
 def quaternion_of(rotation: Array) -> tuple[float, float, float, float]:
