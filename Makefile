@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --disable-pip-version-check -c constraints.t
 SCRIPTS := .ci/run deploy/install
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo up check test test-compose bench bench-classifier bench-simulator fits flight properties people train evaluate picture shapes lock docs format clean
+.PHONY: help setup demo up check test test-compose bench bench-classifier bench-simulator fits flight properties people train evaluate picture shapes vehicles lock docs format clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-17s %s\n", $$1, $$2}' $(MAKEFILE_LIST)

@@ -334,3 +334,48 @@ def test_every_topic_of_the_table_can_be_read(world: World) -> None:
     node = world.node("recorder")
     for name in TOPICS:
         node.on(name, lambda *_: None)
+
+
+def test_a_node_beside_another_has_its_own_keys_and_health_and_is_run_and_closed_with_it(
+    world: World,
+) -> None:
+    first = world.node("sim")
+    other = first.beside("second")
+    heard: list[tuple[str, m.Message]] = []
+    closed: list[str] = []
+    for node in (first, other):
+        node.on("command", lambda message, _ns, name=node.vehicle: heard.append((name, message)))
+        node.on_close(lambda name=node.vehicle: closed.append(name))  # type: ignore[misc]
+    alive: list[tuple[str, bool]] = []
+    world.bus.watch("autocomplete/*/alive/*", lambda key, here: alive.append((key, here)))
+    healths: list[str] = []
+    for name in (VEHICLE, "second"):
+        world.bus.subscribe(key_of(name, "health/sim"), lambda _, name=name: healths.append(name))
+    stop = threading.Event()
+    thread = threading.Thread(target=first.run, args=(stop,))
+    thread.start()
+    try:
+        while len(alive) < 2:
+            stop.wait(0.01)
+        assert {key for key, _ in alive} == {
+            f"autocomplete/{name}/alive/sim" for name in (VEHICLE, "second")
+        }
+    finally:
+        stop.set()
+        first.wake()
+        thread.join(5.0)
+    command = msgpack.packb(
+        {
+            **{"stamp": 1, "seq": 0, "vx": 0.5, "vy": 0.0, "vz": 0.0, "wz": 0.0},
+            **{"action": "fly", "mode": "manual"},
+        }
+    )
+    world.bus.publication(key_of("second", "command"), Delivery.COMMAND, "").put(command)
+    world.clock.advance(0.1)
+    first.spin()
+    assert [name for name, _ in heard] == ["second"]
+    world.clock.advance(1.0)
+    first.spin()
+    assert sorted(healths) == ["second", VEHICLE]
+    first.close()
+    assert closed == ["second", VEHICLE]

@@ -2,17 +2,22 @@
 
 import itertools
 import math
+from dataclasses import replace
+from typing import Literal
 
+import numpy as np
 import pytest
 from flights import command
 
 import worlds
 from common.messages import Command, Message, ResetRequest, encode
 from services.sim.body import Sticks
-from services.sim.cameras import Shot
+from services.sim.cameras import Shot, cameras_of
 from services.sim.config import Config
 from services.sim.core import APART_M, PHYSICS_HZ, ResetError, Simulation
 from services.sim.crew import crew_of, names_of
+from services.sim.renderer import NoOpenGlError
+from services.sim.studio import open_renderer
 
 Messages = list[tuple[str, Message]]
 
@@ -149,6 +154,34 @@ def test_a_camera_sees_the_others_and_not_its_own_vehicle() -> None:
             assert figure.look == other.plant.build.look
             assert math.dist(figure.position_m, other.state.position_m) < 1e-3
     simulation.close()
+
+
+@pytest.mark.parametrize("choice", ["gl", "tiny"])
+def test_another_vehicle_is_in_the_picture_where_it_is(choice: Literal["gl", "tiny"]) -> None:
+    config = Config(world="empty", vehicles="tum,ardrone")
+    simulation = Simulation(config)
+    simulation.reset(ResetRequest(position=(0.0, 0.0, 2.0)), 0)
+    simulation.reset(ResetRequest(position=(2.21, 0.5, 2.0)), 1)
+    (shot,) = [s for s in run(simulation, 0.034, None, None)[1][0] if s.topic == "camera/front"]
+    try:
+        renderer = open_renderer(choice)
+    except NoOpenGlError:
+        pytest.skip("no OpenGL here")
+    renderer.load(simulation.scene())
+    camera = cameras_of(config)[0]
+    pictures = [
+        renderer.draw(camera, each).astype(int).copy() for each in (shot, replace(shot, others=()))
+    ]
+    again = renderer.draw(camera, shot)
+    assert np.abs(again - pictures[0]).max() == 0
+    renderer.close()
+    simulation.close()
+    rows, columns = np.nonzero(np.abs(pictures[0] - pictures[1]).max(axis=2) > 8)
+    # It is 2 m before the camera and 0.5 m to the left, half a metre wide.
+    focal, _, cx, cy = camera.lens.intrinsics
+    assert columns.mean() == pytest.approx(cx - focal * 0.25, abs=15.0)
+    assert rows.mean() == pytest.approx(cy, abs=15.0)
+    assert np.ptp(columns) == pytest.approx(focal * 0.26, rel=0.25)
 
 
 @pytest.mark.parametrize(
