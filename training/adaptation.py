@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
-from training.fit import THREADS, Fitted, joined, loss_of, said
+from training.fit import THREADS, Fitted, loss_of, said
 from training.network import Network
 from training.scores import weighted_f1
 from training.windows import (
@@ -17,12 +17,13 @@ from training.windows import (
     Examples,
     IntArray,
     Windows,
+    joined,
     random_windows,
     seen_after,
 )
 
-STEPS = 200
-OWN_BATCH, OTHERS_BATCH = 128, 256
+STEPS = 100
+OWN_BATCH, OTHERS_BATCH = 64, 192
 LEARNING_RATE = 3e-3
 OWN_WEIGHT = 0.05
 """Of the person's own loss, beside that of departing from the old answers to others."""

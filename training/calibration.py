@@ -12,6 +12,11 @@ RIGHT_SHARE = 0.95
 """Of the answers above `confidence_min`."""
 FEWEST = 20
 """Answers that a share is counted over."""
+USUAL_SAMPLES = 100
+"""2 s."""
+
+Scaling = tuple[float, float]
+"""What `scaled` goes by."""
 
 
 def _fitted(parameters: Tensor, loss_of_them: Callable[[], Tensor]) -> None:
@@ -27,11 +32,34 @@ def _fitted(parameters: Tensor, loss_of_them: Callable[[], Tensor]) -> None:
     optimiser.step(closure)  # type: ignore[no-untyped-call]
 
 
-def temperature_of(logits: Tensor, labels: Tensor) -> float:
-    """The temperature that makes probabilities match how often they are right (Guo et al. 2017)."""
-    log_t = torch.zeros(1, requires_grad=True)
-    _fitted(log_t, lambda: F.cross_entropy(logits / log_t.exp(), labels))
-    return float(log_t.exp().item())
+def scaling_of(logits: Tensor, lengths: Tensor, labels: Tensor) -> Scaling:
+    """The scaling that makes probabilities match how often they are right.
+
+    Args:
+        logits: (n, 4) of the primitives.
+        lengths: (n,) samples in each window.
+        labels: (n,) indices of the primitives.
+    """
+    row = torch.zeros(2, requires_grad=True)
+    _fitted(row, lambda: F.cross_entropy(scaled(logits, lengths, row), labels))
+    usual, per_e_fold = row.detach().tolist()
+    return usual, per_e_fold
+
+
+def scaled(logits: Tensor, lengths: Tensor, scaling: Tensor) -> Tensor:
+    """Logits (n, 4) over a temperature (Guo et al. 2017) that goes with the length of the window.
+
+    A short one is more often the beginning of something else than training's whole ones tell.
+
+    Args:
+        logits: (n, 4).
+        lengths: (n,) samples.
+        scaling: (2,) logarithm of 1 / temperature at `USUAL_SAMPLES`, and what each factor of e in
+            the length adds to it.
+    """
+    usual, per_e_fold = torch.split(scaling, 1)
+    age = torch.log(lengths.to(logits.dtype) / USUAL_SAMPLES).unsqueeze(1)
+    return logits * torch.exp(usual + age * per_e_fold)
 
 
 def platt_of(logit: Tensor, is_meant: Tensor) -> tuple[float, float]:

@@ -66,7 +66,7 @@ sets. Classes are as frequent as in the thesis, and a fifth of all is none of th
 |---|---|---|---|
 {sets}
 
-{epochs} epochs of random windows, temperature {run.fitted.temperature:.2f}.
+{epochs} epochs of random windows.
 
 ## Figures on people held out
 

@@ -65,7 +65,7 @@ def save(fitted: Fitted, path: Path) -> None:
         {
             "architecture": asdict(fitted.network.architecture),
             "weights": fitted.network.state_dict(),
-            "temperature": fitted.temperature,
+            "scaling": fitted.scaling,
             "platt": fitted.platt,
             "confidence_min": fitted.confidence_min,
         },
@@ -91,9 +91,8 @@ def load(path: Path) -> Fitted:
     try:
         network = Network(Architecture(**state["architecture"]))
         network.load_state_dict(state["weights"])
-        return Fitted(
-            network.eval(), state["temperature"], tuple(state["platt"]), state["confidence_min"]
-        )
+        scaling = tuple(state["scaling"])
+        return Fitted(network.eval(), scaling, tuple(state["platt"]), state["confidence_min"])
     except (RuntimeError, KeyError, TypeError):
         raise _unfit(path) from None
 

@@ -3,7 +3,7 @@
 import copy
 import pickle
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +14,17 @@ from torch.nn import functional as F  # noqa: N812
 
 from common.sticks import FULL_STICK
 from services.classifier.window import WINDOW_SAMPLES
-from training.calibration import confidence_min_of, platt_of, temperature_of
+from training.calibration import Scaling, confidence_min_of, platt_of, scaling_of
 from training.dataset.primitive import Primitive
 from training.network import Architecture, Calibrated, Network
 from training.windows import (
     NONE_INDEX,
     Array32,
     Examples,
-    IntArray,
     Windows,
+    asked_windows,
     examples_of,
+    joined,
     padded,
     random_tracks,
     random_windows,
@@ -34,8 +35,10 @@ FULL_YAW_RADPS = FULL_STICK["tum"].yaw_radps
 VALIDATION_CUTS = 3
 MEANT_WEIGHT = 0.5
 """Of the loss of `meant`, beside that of the primitives."""
-BUCKET_BATCHES = 8
-"""Windows are sorted by length among so many batches, so that little is padded."""
+MIXED = torch.distributions.Beta(torch.tensor(0.3), torch.tensor(0.3))
+"""Each window's features are mixed with another one's in such shares (Zhang et al. 2018)."""
+MEASURED = 2000
+"""Windows that features are standardised by."""
 AVERAGE_STEPS = 200
 """The weights that are kept are a running mean over about so many steps."""
 WARM_UP_SHARE = 0.15
@@ -64,8 +67,11 @@ class Budget:
         return max(1, round(self.windows / examples))
 
 
-EVALUATION = Budget(windows=300_000)
+EVALUATION = Budget(windows=500_000)
 """For one fold of an evaluation."""
+
+
+UNSCALED: Scaling = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -86,14 +92,14 @@ class Fitted:
 
     Attributes:
         network: in evaluation mode.
-        temperature: divides the primitives' logits.
+        scaling: of the primitives' logits; see training/calibration.py.
         platt: scale and shift of the logit of `meant`.
         confidence_min: `meant` times the largest probability above which 95 % of answers are right.
         history: of the training.
     """
 
     network: Network
-    temperature: float = 1.0
+    scaling: Scaling = UNSCALED
     platt: tuple[float, float] = (1.0, 0.0)
     confidence_min: float = 0.5
     history: tuple[Epoch, ...] = field(default=(), repr=False)
@@ -101,7 +107,7 @@ class Fitted:
     @property
     def calibrated(self) -> Calibrated:
         """The module that answers as the exported file does."""
-        return Calibrated(self.network, self.temperature, self.platt).eval()
+        return Calibrated(self.network, self.scaling, self.platt).eval()
 
     def probabilities(
         self, windows: Windows, full_yaw_radps: float = FULL_YAW_RADPS
@@ -167,12 +173,6 @@ def accuracy_of(logits: Tensor, labels: Tensor) -> float:
     return float(right.float().mean().item()) if len(right) else 0.0
 
 
-def joined(parts: Sequence[Windows]) -> Windows:
-    """Windows one set after another, padded to the longest."""
-    tracks = [w.sticks[k, : w.lengths[k]] for w in parts for k in range(len(w))]
-    return padded(tracks, np.concatenate([w.labels for w in parts]))
-
-
 class Training:
     """A training that can be stopped after any epoch and gone on with.
 
@@ -210,8 +210,10 @@ class Training:
             random_windows(validation, self._rng, augment=False) for _ in range(VALIDATION_CUTS)
         ]
         self.held = joined(drawn)
+        self._asked = asked_windows(validation, self._rng)
         self._held_labels = torch.from_numpy(self.held.labels)
         self._network = Network(architecture)
+        self._measure(training)
         self._average = copy.deepcopy(self._network).requires_grad_(False)
         self._optimiser = torch.optim.AdamW(
             self._network.parameters(),
@@ -241,7 +243,10 @@ class Training:
         labels = self._examples.labels
         self._network.train()
         loss_sum, right = 0.0, 0.0
-        batches = self._batches(np.array([len(track) for track in tracks]))
+        # Not by length, which would pad less: batch norms would see other lengths than they fly.
+        size = self._budget.batch
+        order = self._rng.permutation(len(tracks))
+        batches = [order[begin : begin + size] for begin in range(0, len(order), size)]
         for done, rows in enumerate(batches, 1):
             windows = padded([tracks[k] for k in rows], labels[rows])
             loss, accuracy = self._step(windows)
@@ -268,7 +273,7 @@ class Training:
         """The best network so far, calibrated on the validation windows."""
         network = copy.deepcopy(self._average)
         network.load_state_dict(self._best)
-        return calibrated(network.eval(), self.held, tuple(self.history))
+        return calibrated(network.eval(), self._asked, tuple(self.history))
 
     def save(self, path: Path) -> None:
         """Write all that `resume` needs."""
@@ -319,28 +324,29 @@ class Training:
         self._rng.bit_generator.state = state["rng"]
         torch.set_rng_state(state["torch_rng"])
 
+    def _measure(self, examples: Examples) -> None:
+        """Standardises the summary's features by some of the windows that will be learned from."""
+        some = examples.rows(self._rng.permutation(len(examples))[:MEASURED])
+        windows = random_windows(some, self._rng, augment=self._augment)
+        self._network.measure(*inputs_of(windows, FULL_YAW_RADPS))
+
     def _tracks(self) -> list[Array32]:
         if self._cuts:
             return random_tracks(self._examples, self._rng, augment=self._augment)
         return whole_tracks(self._examples)
 
-    def _batches(self, lengths: IntArray) -> list[IntArray]:
-        """Rows of each batch: windows of alike lengths together, in random order."""
-        size = self._budget.batch
-        order = self._rng.permutation(len(lengths))
-        batches = []
-        for begin in range(0, len(order), size * BUCKET_BATCHES):
-            bucket = order[begin : begin + size * BUCKET_BATCHES]
-            bucket = bucket[np.argsort(lengths[bucket], kind="stable")]
-            batches += [bucket[k : k + size] for k in range(0, len(bucket), size)]
-        return [batches[k] for k in self._rng.permutation(len(batches))]
-
     def _step(self, windows: Windows) -> tuple[float, float]:
         """One step of the optimiser; loss and accuracy of the batch."""
         labels = torch.from_numpy(windows.labels)
         self._optimiser.zero_grad()
-        logits, meant = self._network(*inputs_of(windows, FULL_YAW_RADPS))
-        loss = loss_of(logits, meant, labels)
+        features = self._network.features(*inputs_of(windows, FULL_YAW_RADPS))
+        share = float(MIXED.sample().item())
+        other = torch.randperm(len(labels))
+        logits, meant = self._network.answers(
+            [share * one + (1.0 - share) * one[other] for one in features]
+        )
+        loss = share * loss_of(logits, meant, labels)
+        loss = loss + (1.0 - share) * loss_of(logits, meant, labels[other])
         loss.backward()  # type: ignore[no-untyped-call]
         nn.utils.clip_grad_norm_(self._network.parameters(), 1.0)
         self._optimiser.step()
@@ -358,23 +364,18 @@ class Training:
         return float(loss.item()), accuracy_of(logits.detach(), labels)
 
 
-def calibrated(network: Network, held: Windows, history: tuple[Epoch, ...] = ()) -> Fitted:
-    """A network with temperature, `meant` and threshold fitted on windows it has not learned."""
-    logits, meant = said(network, held)
-    labels = torch.from_numpy(held.labels)
+def calibrated(network: Network, asked: Windows, history: tuple[Epoch, ...] = ()) -> Fitted:
+    """A network with scaling, `meant` and threshold fitted on windows it has not learned."""
+    logits, meant = said(network, asked)
+    labels = torch.from_numpy(asked.labels)
     is_meant = labels != NONE_INDEX
-    temperature = temperature_of(logits[is_meant], labels[is_meant])
+    lengths = torch.from_numpy(asked.lengths)[is_meant]
+    scaling = scaling_of(logits[is_meant], lengths, labels[is_meant])
     # Without a single `none` there is nothing to tell apart: all is meant.
     platt = (1.0, 0.0) if bool(is_meant.all()) else platt_of(meant, is_meant)
-    fitted = Fitted(network, temperature, platt, history=history)
-    probabilities, certainty = fitted.answers(held)
-    return Fitted(
-        network,
-        temperature,
-        platt,
-        confidence_min_of(probabilities, certainty, held.labels),
-        history,
-    )
+    fitted = Fitted(network, scaling, platt, history=history)
+    threshold = confidence_min_of(*fitted.answers(asked), asked.labels)
+    return replace(fitted, confidence_min=threshold)
 
 
 def fit_network(

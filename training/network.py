@@ -10,12 +10,15 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F  # noqa: N812
 
+from training.calibration import Scaling, scaled
 from training.geometry import Geometry
 from training.labels import PRIMITIVES
 
 LEAK = 0.1
 LARGEST = 6.0
 """Inputs beyond so many standard deviations say no more than this."""
+FLAT = 0.05
+"""Added to a feature's standard deviation."""
 # Decisions, each yes or no: curved, climbing, alternating. A primitive is what they come to; those
 # that do not bear on it are left out (its row's sign is 0).
 DECISIONS = {
@@ -35,18 +38,44 @@ class Architecture:
         summary: units of the two layers that read the summary; 0 leaves it out.
         head: units of the head's hidden layer.
         dropout: of all dropout layers.
+        noise: on the summary's features in training, in standard deviations of each.
+        absent: share of the windows in training whose series' features are left out, so that the
+            summary is learned to be read alone as well.
         geometry: whether convolutions see geometry, or the sticks alone.
         decisions: whether the four probabilities are composed of three decisions.
         pooling: what is taken of the GRUs' states over time.
     """
 
-    width: int = 48
+    width: int = 32
     summary: int = 128
     head: int = 64
     dropout: float = 0.1
+    noise: float = 0.15
+    absent: float = 0.5
     geometry: bool = True
     decisions: bool = True
     pooling: tuple[str, ...] = ("last", "mean", "largest")
+
+
+class _Standard(nn.Module):
+    """Features with mean 0 and variance 1 over windows that are measured once."""
+
+    mean: Tensor
+    scale: Tensor
+
+    def __init__(self, features: int) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(features))
+        self.register_buffer("scale", torch.ones(features))
+
+    def measure(self, x: Tensor) -> None:
+        """Take means and deviations of rows (n, features)."""
+        self.mean.copy_(x.mean(0))
+        # Some features hardly vary: without a floor their rounding errors would count.
+        self.scale.copy_(1.0 / (x.std(0) + FLAT))
+
+    def forward(self, x: Tensor) -> Tensor:
+        return ((x - self.mean) * self.scale).clamp(-LARGEST, LARGEST)
 
 
 class _Convolution(nn.Module):
@@ -156,8 +185,7 @@ class Network(nn.Module):
             self.encoder = Encoder(channels, a.width, a.dropout, a.pooling)
             features += self.encoder.features
         if a.summary:
-            # Some features hardly vary: without a floor their rounding errors would count.
-            self.standardise = nn.BatchNorm1d(Geometry.SUMMARY, eps=1e-4)
+            self.standardise = _Standard(Geometry.SUMMARY)
             self.reader = nn.Sequential(
                 nn.Linear(Geometry.SUMMARY, a.summary),
                 nn.LeakyReLU(LEAK),
@@ -187,16 +215,43 @@ class Network(nn.Module):
 
         Inputs as in services/classifier/model.py.
         """
+        return self.answers(self.features(sticks, times_s, lengths, full_yaw_radps))
+
+    def measure(
+        self, sticks: Tensor, times_s: Tensor, lengths: Tensor, full_yaw_radps: Tensor
+    ) -> None:
+        """Standardise the summary by these windows, before anything is learned."""
+        if self.architecture.summary:
+            with torch.no_grad():
+                _, _, summary = self.geometry(sticks, times_s, lengths, full_yaw_radps)
+            self.standardise.measure(summary)
+
+    def features(
+        self, sticks: Tensor, times_s: Tensor, lengths: Tensor, full_yaw_radps: Tensor
+    ) -> list[Tensor]:
+        """What is known of windows: what the encoder makes of the series, and the summary."""
+        a = self.architecture
         with torch.no_grad():
             x, mask, summary = self.geometry(sticks, times_s, lengths, full_yaw_radps)
         features = []
-        if self.architecture.width:
-            features.append(
-                self.encoder(x if self.architecture.geometry else x[:, Geometry.STICKS], mask)
-            )
+        if a.width:
+            series = self.encoder(x if a.geometry else x[:, Geometry.STICKS], mask)
+            if self.training and a.summary:
+                series = series * (torch.rand(len(series), 1) >= a.absent)
+            features.append(series)
+        if a.summary:
+            summary = self.standardise(summary)
+            if self.training:
+                summary = summary + a.noise * torch.randn_like(summary)
+            features.append(summary)
+        return features
+
+    def answers(self, features: list[Tensor]) -> tuple[Tensor, Tensor]:
+        """Logits of the primitives (B, 4) and of `meant` (B,) of what `features` gave."""
+        *series, last = features
         if self.architecture.summary:
-            features.append(self.reader(self.standardise(summary).clamp(-LARGEST, LARGEST)))
-        out = self.head(torch.cat(features, 1))
+            last = self.reader(last)
+        out = self.head(torch.cat([*series, last], 1))
         logits, meant = out[:, :-1], out[:, -1]
         if self.architecture.decisions:
             # log(sigmoid(z)) = -softplus(-z): the probability of a chain is the sum of these.
@@ -209,16 +264,16 @@ class Calibrated(nn.Module):
 
     Args:
         network: which.
-        temperature: divides the primitives' logits.
+        scaling: of the primitives' logits; see training/calibration.py.
         meant: scale and shift of the logit of `meant`.
     """
 
-    def __init__(
-        self, network: Network, temperature: float, meant: tuple[float, float] = (1.0, 0.0)
-    ) -> None:
+    scaling: Tensor
+
+    def __init__(self, network: Network, scaling: Scaling, meant: tuple[float, float]) -> None:
         super().__init__()
         self.network = network
-        self.temperature = temperature
+        self.register_buffer("scaling", torch.tensor(scaling))
         self.meant = meant
 
     def forward(
@@ -227,4 +282,5 @@ class Calibrated(nn.Module):
         """Probabilities (B, 4) and meant (B,)."""
         logits, meant = self.network(sticks, times_s, lengths, full_yaw_radps)
         scale, shift = self.meant
-        return torch.softmax(logits / self.temperature, 1), torch.sigmoid(meant * scale + shift)
+        probabilities = torch.softmax(scaled(logits, lengths, self.scaling), 1)
+        return probabilities, torch.sigmoid(meant * scale + shift)

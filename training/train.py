@@ -21,10 +21,9 @@ from training.scores import (
     score,
     weighted_f1,
 )
-from training.windows import NONE_INDEX, Examples, Windows, examples_of, seen_after
+from training.windows import MOMENTS_S, NONE_INDEX, Examples, Windows, examples_of, seen_after
 
 MODEL_NAME = "intent"
-EARLY_S = (1.0, 1.5, 2.0, 3.0)
 PARITY_ROWS = 200
 
 
@@ -50,7 +49,7 @@ PRESETS = {
         training=Share(wide_people=600, wide=8.0, thesis_people=250, thesis=4.0),
         validation=Share(wide_people=75, wide=0.7, thesis_people=50, thesis=0.4),
         test=Share(wide_people=100, wide=1.0, thesis_people=50, thesis=1.0),
-        budget=Budget(windows=750_000),
+        budget=Budget(windows=1_200_000),
     ),
     "quick": Preset(
         training=Share(wide_people=24, wide=0.4, thesis_people=10, thesis=0.2),
@@ -140,7 +139,7 @@ def judge(name: str, model: OnnxModel, examples: Examples) -> Judged:
     said = whole[is_meant].argmax(axis=1)
     classes = len(PRIMITIVES)
     early = []
-    for after_s in EARLY_S:
+    for after_s in MOMENTS_S:
         then = answers_of(model, seen_after(shapes, after_s))[0].argmax(axis=1)
         early.append((after_s, score(truth, then, people, classes, 0)))
     return Judged(

@@ -16,6 +16,8 @@ Array32 = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 Text = NDArray[np.str_]
 
+MOMENTS_S = (1.0, 1.5, 2.0, 3.0)
+"""Early answers are judged so long after a motion began."""
 NONE_INDEX = CLASSES.index(NONE)
 ASKED_SAMPLES = (SHORTEST_SAMPLES, WINDOW_SAMPLES + 20)
 """When a service asks does not depend on how long a primitive will last: cuts must not either, or
@@ -47,10 +49,10 @@ class Cuts:
         spliced: begin with the end of another primitive, flown into this one without a pause.
     """
 
-    whole: float = 0.3
-    early: float = 0.2
-    headless: float = 0.2
-    spliced: float = 0.15
+    whole: float = 0.5
+    early: float = 0.3
+    headless: float = 0.05
+    spliced: float = 0.1
 
 
 CUTS = Cuts()
@@ -140,6 +142,26 @@ def seen_after(examples: Examples, seconds: float | None) -> Windows:
         end = len(track) if seconds is None else round(seconds * MODEL_RATE_HZ)
         tracks.append(track[:end][-WINDOW_SAMPLES:])
     return padded(tracks, examples.labels)
+
+
+def joined(parts: Sequence[Windows]) -> Windows:
+    """Windows one set after another, padded to the longest."""
+    tracks = [w.sticks[k, : w.lengths[k]] for w in parts for k in range(len(w))]
+    return padded(tracks, np.concatenate([w.labels for w in parts]))
+
+
+def asked_windows(examples: Examples, rng: np.random.Generator) -> Windows:
+    """Windows as a service asks for them: of each motion after `MOMENTS_S` and at its end.
+
+    Nothing is cut at random times, as often.
+    """
+    shapes = examples.rows(np.flatnonzero(examples.labels != NONE_INDEX))
+    nothing = examples.rows(np.flatnonzero(examples.labels == NONE_INDEX))
+    moments = (*MOMENTS_S, None)
+    parts = [seen_after(shapes, after_s) for after_s in moments]
+    if len(nothing):
+        parts += [random_windows(nothing, rng, augment=False) for _ in moments]
+    return joined(parts)
 
 
 def random_windows(

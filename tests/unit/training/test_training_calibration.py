@@ -2,17 +2,28 @@ import numpy as np
 import pytest
 import torch
 
-from training.calibration import RIGHT_SHARE, confidence_min_of, platt_of, temperature_of
+from training.calibration import (
+    RIGHT_SHARE,
+    confidence_min_of,
+    platt_of,
+    scaled,
+    scaling_of,
+)
 
 torch.set_num_threads(1)
 
 
-def test_the_temperature_cools_overconfident_logits() -> None:
+def test_the_scaling_cools_overconfident_logits_the_more_the_shorter_the_window() -> None:
     torch.manual_seed(0)
     rng = np.random.default_rng(0)
-    true_logits = torch.from_numpy(rng.normal(0.0, 1.5, (1000, 4)))
+    true_logits = torch.from_numpy(rng.normal(0.0, 1.5, (4000, 4)))
     labels = torch.distributions.Categorical(logits=true_logits).sample()
-    assert temperature_of(3.0 * true_logits, labels) == pytest.approx(3.0, rel=0.15)
+    lengths = torch.from_numpy(rng.integers(20, 401, 4000))
+    temperature = 3.0 * (lengths / 100.0).unsqueeze(1) ** -0.5
+    scaling = scaling_of(temperature * true_logits, lengths, labels)
+    found = scaled(temperature * true_logits, lengths, torch.tensor(scaling))
+    assert (found.std() / true_logits.std()).item() == pytest.approx(1.0, abs=0.07)
+    assert scaling[1] == pytest.approx(0.5, abs=0.1)
 
 
 def test_meant_becomes_a_probability() -> None:

@@ -27,6 +27,7 @@ def untrained(architecture: Architecture | None = None) -> Fitted:
             module.running_var.uniform_(0.3, 2.0)
             torch.nn.init.uniform_(module.weight, 0.5, 1.5)
             torch.nn.init.normal_(module.bias, 0.0, 0.2)
+    network.measure(*inputs_of(window(*(sticks_of(k, k) for k in range(20, 401))), YAW_RADPS))
     last = network.head[-1]
     torch.nn.init.zeros_(last.bias)
     network.eval()
@@ -38,10 +39,11 @@ def untrained(architecture: Architecture | None = None) -> Fitted:
             network(*inputs_of(window(sticks_of(length, length)), YAW_RADPS))
         handle.remove()
         spread = torch.cat(decided)
-        last.weight /= spread.std(0)[:, None]
-        last.bias -= spread.mean(0) / spread.std(0)
-        last.bias[0] += 1.0
-    return Fitted(network, temperature=0.9, platt=(0.8, 0.1), confidence_min=0.4)
+        scale = 0.4 / spread.std(0)
+        last.weight *= scale[:, None]
+        last.bias -= spread.mean(0) * scale
+        last.bias[0] += 0.4
+    return Fitted(network, scaling=(0.1, 0.2), platt=(0.8, 0.1), confidence_min=0.4)
 
 
 @pytest.fixture(scope="module")
