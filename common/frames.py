@@ -1,6 +1,6 @@
 """Frames and angles: world ENU, body FLU, heading (body without roll and pitch), optical.
 
-Rotations themselves are scipy's; quaternions are [x, y, z, w], body to world, as in scipy.
+Quaternions are [x, y, z, w], body to world, as in scipy.
 """
 
 import math
@@ -32,7 +32,16 @@ def quaternion_of(roll_rad: float, pitch_rad: float, yaw_rad: float) -> tuple[fl
 
 def rotation_of(orientation: Sequence[float]) -> Array:
     """The 3x3 matrix that turns body vectors into world vectors."""
-    return np.asarray(Rotation.from_quat(orientation).as_matrix(), dtype=np.float64)
+    # By hand, since it is asked for with every picture: scipy's way takes 60 us.
+    x, y, z, w = orientation
+    s = 2.0 / (x * x + y * y + z * z + w * w)
+    return np.array(
+        [
+            [1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
+            [s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)],
+            [s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)],
+        ]
+    )
 
 
 def heading_to_world(vx: float, vy: float, yaw_rad: float) -> tuple[float, float]:

@@ -22,7 +22,7 @@ def test_pictures_are_the_same_whoever_draws_them_and_errors_come_to_who_wants_t
     spoilt = [darkroom.develop(NO_SHOT) for _ in range(PAINTERS)]
     late = darkroom.develop(SHOT)
     for order in spoilt:
-        with pytest.raises(ValueError, match="shape"):
+        with pytest.raises(ValueError, match="unpack"):
             order.result()
     with pytest.raises(RuntimeError, match="ended"):
         late.result()
