@@ -65,13 +65,15 @@ def wire(node: Node, config: Config) -> None:
         node.on_close(studio.close)
 
     def advance(commands: list[m.Command | None]) -> None:
+        shots: list[Shot] = []
         for each, step in zip(nodes, simulation.step_all(commands), strict=True):
             for topic, message in step.messages:
                 each.publish(topic, message)
-            if step.shots and studio is not None:
-                studio.take(step.shots)
-        if in_lockstep and studio is not None:
-            studio.finish()
+            shots += step.shots
+        if shots and studio is not None:
+            studio.take(shots)
+            if in_lockstep:
+                studio.finish()
 
     def tick(now_ns: int) -> None:
         for _ in range(pace.due(now_ns)):
