@@ -1,6 +1,7 @@
 """The parts of the command line that need no network."""
 
 import argparse
+import dataclasses
 import threading
 from pathlib import Path
 
@@ -11,11 +12,12 @@ from cli.contract import page
 from cli.echo import summary
 from cli.main import main
 from cli.meter import WINDOW_S, Meter
-from cli.run import _service_in
+from cli.run import _meanings_in, _service_in
 from common import messages as m
 from common.config import ConfigError
 from common.memory_bus import MemoryBus, MemoryNetwork
-from common.topics import QUERIES, TOPICS
+from common.run import config_type_of
+from common.topics import QUERIES, SERVICES, TOPICS
 
 ROOT = Path(__file__).parents[3]
 
@@ -91,6 +93,13 @@ def test_the_service_to_run_is_found_among_its_options(
     words: list[str], service: str | None
 ) -> None:
     assert _service_in(words) == service
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_help_says_what_each_setting_of_a_service_means(service: str) -> None:
+    config = config_type_of(service)
+    meanings = _meanings_in(config)
+    assert all(meanings.get(field.name) for field in dataclasses.fields(config))
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "nan", "inf", "soon", ""])
