@@ -25,7 +25,8 @@ class Marks:
     """The marks of one size of evaluation.
 
     People and windows are known by what they come to, not by how they are written: some are made,
-    and their numbers are hashed.
+    and their numbers are hashed. Source files are read at once: an evaluation takes hours, and they
+    may be edited meanwhile.
 
     Args:
         size: of the folds.
@@ -51,28 +52,29 @@ class Marks:
         self._windows = windows.hexdigest()[:16]
         self._asked = code_of(*QUESTIONS)
         self._budget = size.budget
+        self._code = {name: code_of(*paths) for name, paths in CODE.items()}
+        self._hover = code_of(
+            "training/evaluation/hover.py", "services/classifier/*.py", "services/synthesis/**/*.py"
+        )
+        self._adaptation = code_of(
+            "training/adaptation.py", "training/evaluation/unusual.py", "training/generator/*.py"
+        )
 
     def classifier(self, name: str) -> str:
         """Of what a classifier answers."""
         budget = f" {self._budget}" if name == OURS else ""
-        return f"{self._people} {self._windows} {self._asked} {code_of(*CODE[name])}{budget}"
+        return f"{self._people} {self._windows} {self._asked} {self._code[name]}{budget}"
 
     def hover(self) -> str:
         """Of what our network suggests to who only holds a place."""
         held = hashlib.sha256()
         for hold, places in holds(2, 3.0, 0):
             held.update(hold.sticks.tobytes() + places.tobytes())
-        code = code_of(
-            "training/evaluation/hover.py", "services/classifier/*.py", "services/synthesis/**/*.py"
-        )
-        return f"{self.classifier(OURS)} {held.hexdigest()[:16]} {code}"
+        return f"{self.classifier(OURS)} {held.hexdigest()[:16]} {self._hover}"
 
     def adaptation(self) -> str:
         """Of what a few performances of their own do for unusual people."""
-        code = code_of(
-            "training/adaptation.py", "training/evaluation/unusual.py", "training/generator/*.py"
-        )
-        return f"{self.classifier(OURS)} {code}"
+        return f"{self.classifier(OURS)} {self._adaptation}"
 
     def machine(self) -> str:
         """Of the thesis' machine on its own task."""

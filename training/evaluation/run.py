@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -78,14 +78,8 @@ class Evaluation:
         self._cache = Cache(order.out / "results" / part)
         self._models = order.out / "models" / part
         self._not_run: dict[str, str] = {}
-
-    @cached_property
-    def _marks(self) -> Marks:
-        return Marks(self._size)
-
-    @cached_property
-    def _recordings(self) -> str:
-        return f"{of_recordings()} {self._order.size}"
+        self._marks = Marks(self._size)
+        self._recordings = f"{of_recordings()} {order.size}"
 
     def find(self) -> None:
         """Train and ask whatever is ordered and not kept."""
