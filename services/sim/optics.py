@@ -36,7 +36,7 @@ class Renderer(Protocol):
         ...
 
     def draw(self, camera: Camera, shot: Shot) -> Picture:
-        """The picture (height, width, 3) in BGR by a pinhole; overwritten by the next one."""
+        """The picture (height, width, 3) in BGR by a pinhole; the next but one may overwrite it."""
         ...
 
     def close(self) -> None:
@@ -46,13 +46,14 @@ class Renderer(Protocol):
 
 def picture_of(renderer: Renderer, camera: Camera, shot: Shot) -> Picture:
     """The picture (height, width, 3) in BGR as the camera takes it."""
-    picture = _exposed(renderer, camera, shot)
-    if camera.noise > 0.0:
-        picture = _noisy(picture, camera.noise, [camera.seed, shot.stamp_ns])
-    return picture
+    return noisy(exposed(renderer, camera, shot), camera, shot)
 
 
-def _exposed(renderer: Renderer, camera: Camera, shot: Shot) -> Picture:
+def exposed(renderer: Renderer, camera: Camera, shot: Shot) -> Picture:
+    """The picture (height, width, 3) in BGR as it falls through lens and shutter.
+
+    It may be overwritten by the next but one of its lens.
+    """
     if camera.exposure_s == 0.0:
         return _bent(renderer, camera, shot)
     total: Any = 0
@@ -106,9 +107,12 @@ def _unbent(bent: Array, k1: float, k2: float) -> Array:
     return r
 
 
-def _noisy(picture: Picture, scale: float, seed: list[int]) -> Picture:
-    """With a gain that is off, and noise that grows with the light."""
-    generator = np.random.default_rng(seed)
+def noisy(picture: Picture, camera: Camera, shot: Shot) -> Picture:
+    """With a gain that is off, and noise that grows with the light, if the camera has any."""
+    scale = camera.noise
+    if scale == 0.0:
+        return picture
+    generator = np.random.default_rng([camera.seed, shot.stamp_ns])
     gain = 1.0 + scale * GAIN_NOISE * generator.standard_normal()
     height, width = picture.shape[:2]
     # One tile, begun anywhere and repeated: drawing a million numbers a picture takes 10 ms.

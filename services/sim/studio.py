@@ -1,18 +1,21 @@
-"""Takes the pictures on a thread of its own; what it cannot take in time is dropped."""
+"""Takes the pictures on threads of its own; what it cannot take in time is dropped."""
 
 import logging
 import threading
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Literal
 
 import cv2
 
 from common import messages as m
+from common.clock import NS_PER_S
 from services.sim.cameras import Camera, Shot
-from services.sim.optics import Renderer, picture_of
+from services.sim.optics import Renderer, exposed, noisy
 from services.sim.renderer import GlRenderer, NoOpenGlError, jpeg_of
 from services.sim.stage import Scene
+from services.sim.textures import Picture
 
 log = logging.getLogger(__name__)
 
@@ -43,13 +46,18 @@ def open_renderer(choice: Choice) -> Renderer:
 
 def photograph(renderer: Renderer, camera: Camera, shot: Shot, quality: int) -> m.Image:
     """The message of one picture."""
+    return developed(exposed(renderer, camera, shot), camera, shot, quality)
+
+
+def developed(picture: Picture, camera: Camera, shot: Shot, quality: int) -> m.Image:
+    """The message of a picture that was exposed."""
     return m.Image(
         stamp=shot.stamp_ns,
         seq=0,
         width=camera.lens.width,
         height=camera.lens.height,
         format="jpeg",
-        data=jpeg_of(picture_of(renderer, camera, shot), quality),
+        data=jpeg_of(noisy(picture, camera, shot), quality),
         intrinsics=camera.lens.intrinsics,
         distortion=camera.lens.distortion,
         capture=shot.stamp_ns,
@@ -59,11 +67,13 @@ def photograph(renderer: Renderer, camera: Camera, shot: Shot, quality: int) -> 
 class Studio:
     """Cameras that never hold up physics: shots that wait too long are dropped.
 
+    One thread draws, for all cameras of all vehicles, and another one encodes what it has drawn.
+
     Args:
         choice: of the renderer.
         cameras: of all vehicles.
         quality: of the JPEG.
-        publish: called on the studio's thread with each shot and its picture.
+        publish: called on the encoding thread with each shot and its picture.
     """
 
     def __init__(
@@ -78,11 +88,12 @@ class Studio:
         self._quality = quality
         self._publish = publish
         self._wake = threading.Condition()
-        self._shots: deque[Shot] = deque()
+        self._shots: list[Shot] = []
         self._scene: Scene | None = None
         self._stopping = False
         self._ready = False
-        self._busy = False
+        self._drawing = False
+        self._encoding = False
         self.dropped: Counter[str] = Counter()
         self.renderer = "starting"
         self.failure = ""
@@ -109,7 +120,9 @@ class Studio:
     def finish(self) -> None:
         """Wait until all pictures that were asked for are taken."""
         with self._wake:
-            while (self._shots or self._scene or self._busy) and not self.failure:
+            while (
+                self._shots or self._scene or self._drawing or self._encoding
+            ) and not self.failure:
                 self._wake.wait()
 
     def close(self) -> None:
@@ -127,33 +140,62 @@ class Studio:
             self.renderer = renderer.name
             log.info("pictures are drawn by %s", renderer.name)
             self._ready = True
-            while self._take_next(renderer):
-                pass
+            with ThreadPoolExecutor(1, "darkroom") as encoder:
+                while self._take_next(renderer, encoder):
+                    pass
             renderer.close()
         except Exception as error:
-            log.exception("no more pictures")
-            with self._wake:
-                self.failure = str(error)
-                self._wake.notify_all()
+            self._fail(error)
 
-    def _take_next(self, renderer: Renderer) -> bool:
+    def _take_next(self, renderer: Renderer, encoder: ThreadPoolExecutor) -> bool:
         """Wait for work and do it; False when it is time to stop."""
         with self._wake:
-            self._busy = False
+            self._drawing = False
             self._wake.notify_all()
-            while not (self._shots or self._scene or self._stopping):
+            while not (self._shots or self._scene or self._stopping or self.failure):
                 self._wake.wait()
-            if self._stopping:
+            if self._stopping or self.failure:
                 return False
             scene, self._scene = self._scene, None
-            shot = self._shots.popleft() if self._shots else None
-            camera = self._cameras[shot.vehicle, shot.topic] if shot else None
-            self._busy = True
+            shot = min(self._shots, key=self._due_ns) if self._shots else None
+            if shot is not None:
+                self._shots.remove(shot)
+                camera = self._camera_of(shot)
+            self._drawing = True
         if scene is not None:
             renderer.load(scene)
-        if shot is not None and camera is not None:
-            self._publish(shot, photograph(renderer, camera, shot, self._quality))
+        if shot is not None:
+            picture = exposed(renderer, camera, shot)
+            with self._wake:
+                # One at a time, since the next but one may overwrite it.
+                while self._encoding:
+                    self._wake.wait()
+                self._encoding = True
+            encoder.submit(self._hand_out, picture, camera, shot)
         return True
+
+    def _hand_out(self, picture: Picture, camera: Camera, shot: Shot) -> None:
+        try:
+            self._publish(shot, developed(picture, camera, shot, self._quality))
+        except Exception as error:
+            self._fail(error)
+        finally:
+            with self._wake:
+                self._encoding = False
+                self._wake.notify_all()
+
+    def _fail(self, error: Exception) -> None:
+        log.error("no more pictures", exc_info=error)
+        with self._wake:
+            self.failure = str(error) or type(error).__name__
+            self._wake.notify_all()
+
+    def _camera_of(self, shot: Shot) -> Camera:
+        return self._cameras[shot.vehicle, shot.topic]
+
+    def _due_ns(self, shot: Shot) -> float:
+        """When its camera takes the next one: what is due first is drawn first."""
+        return shot.stamp_ns + NS_PER_S / self._camera_of(shot).fps
 
     def _drop_before(self, newest: Shot) -> None:
         """Drop what has waited too long for the camera of the newest shot."""

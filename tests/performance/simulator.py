@@ -39,7 +39,7 @@ from services.sim.cameras import SIZES, Shot, cameras_of
 from services.sim.config import Config, FrontSize
 from services.sim.core import PHYSICS_HZ, STEP_S, Simulation
 from services.sim.stage import Scene, Stage
-from services.sim.studio import open_renderer, photograph
+from services.sim.studio import Studio
 from services.synthesis.config import Config as SynthesisConfig
 from services.synthesis.core import Synthesizer
 from studies.darkroom import Darkroom
@@ -85,7 +85,7 @@ def in_turns(contenders: list[Contender], turns: int, progress: Progress) -> dic
 
 def simulated(world: str, plant: str, duration_s: float) -> Callable[[], None]:
     """A turn of physics and sensors without pictures."""
-    config = Config(world=world, plant=plant, renderer="none")  # type: ignore[arg-type]
+    config = Config(world=world, plant=plant, renderer="none")
     simulation = Simulation(config)
 
     def turn() -> None:
@@ -224,15 +224,20 @@ def photographed(size: FrontSize, endpoint: str) -> Callable[[], None]:
     """A turn of our pictures, encoded and published through a router."""
     with_all_cores()
     scene, shots = track_shots()
-    camera = cameras_of(Config(front_size=size))[0]
-    renderer = open_renderer("auto")
-    renderer.load(scene)
     node = Node(ZenohBus(endpoint), "bench", "sim")
     node.publishes("camera/front")
 
+    def publish(shot: Shot, picture: m.Image) -> None:
+        node.publish(shot.topic, picture)
+
+    studio = Studio("auto", cameras_of(Config(front_size=size)), 80, publish)
+    studio.load(scene)
+
     def turn() -> None:
-        for shot in shots:
-            node.publish("camera/front", photograph(renderer, camera, shot, 80))
+        studio.take(shots)
+        studio.finish()
+        if studio.failure:
+            raise RuntimeError(studio.failure)
 
     return turn
 

@@ -9,6 +9,7 @@ from common.messages import Image, Message
 from services.sim import studio
 from services.sim.cameras import Camera, Shot, cameras_of
 from services.sim.config import Config
+from services.sim.optics import Renderer
 from services.sim.renderer import NoOpenGlError
 from services.sim.stage import Scene
 from services.sim.textures import Picture
@@ -94,6 +95,39 @@ def test_two_shots_from_below_may_come_while_a_front_picture_is_drawn(
     assert cameras.dropped["camera/down"] == 2
 
 
+def test_what_is_due_first_is_drawn_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    renderer = SlowRenderer()
+    monkeypatch.setattr(studio, "open_renderer", lambda _choice: renderer)
+    taken: list[tuple[str, int]] = []
+    cameras = studio.Studio(
+        "gl", CAMERAS, 80, lambda shot, _picture: taken.append((shot.topic, shot.stamp_ns))
+    )
+    cameras.take(front_at(0))
+    assert renderer.drawing.wait(5.0)
+    # The next front picture is not due for 33 ms, that of the camera below for 17.
+    cameras.take(front_at(FRONT_NS))
+    cameras.take(down_at(FRONT_NS + 8_000_000))
+    renderer.go_on.release(3)
+    cameras.finish()
+    cameras.close()
+    assert [topic for topic, _ in taken] == ["camera/front", "camera/down", "camera/front"]
+
+
+def test_a_picture_that_cannot_be_published_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    renderer = SlowRenderer()
+    monkeypatch.setattr(studio, "open_renderer", lambda _choice: renderer)
+
+    def refuse(_shot: Shot, _picture: Image) -> None:
+        raise OSError("no network")
+
+    cameras = studio.Studio("gl", CAMERAS, 80, refuse)
+    renderer.go_on.release()
+    cameras.take(down_at(0))
+    cameras.finish()
+    cameras.close()
+    assert cameras.failure == "no network"
+
+
 def test_without_opengl_pybullet_draws_unless_opengl_was_asked_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -111,7 +145,7 @@ def test_without_opengl_pybullet_draws_unless_opengl_was_asked_for(
 def test_a_renderer_that_fails_is_told_and_ends_only_the_pictures(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def fail(_choice: str) -> studio.Renderer:
+    def fail(_choice: str) -> Renderer:
         raise NoOpenGlError("none here")
 
     monkeypatch.setattr(studio, "open_renderer", fail)
