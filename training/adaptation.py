@@ -1,15 +1,14 @@
 """A network learns one person from a few performances, and answers everybody else as before."""
 
 import copy
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 from torch.nn import functional as F  # noqa: N812
 
-from training.fit import THREADS, Fitted, loss_of, said
+from training.fit import FULL_YAW_RADPS, THREADS, Fitted, inputs_of, loss_of
 from training.network import Network
 from training.scores import weighted_f1
 from training.windows import (
@@ -18,6 +17,7 @@ from training.windows import (
     IntArray,
     Windows,
     joined,
+    padded,
     random_windows,
     seen_after,
 )
@@ -29,10 +29,9 @@ OWN_WEIGHT = 0.05
 """Of the person's own loss, beside that of departing from the old answers to others."""
 PULL = 1e-3
 """Towards the old weights: of the squared distance of all of them together."""
-KEPT = ("geometry", "encoder")
-"""Modules whose answers stay: what sticks draw is the same for everybody, what it means is not."""
-STANDARDISES = "standardise."
-"""Weights that stay as well: others' means and deviations of what follows `KEPT`."""
+LEARNING = ("reader.", "head.")
+"""Layers that learn: what sticks draw is the same for everybody, what is meant by it is not."""
+BATCH = 256
 CUTS = 4
 """Windows of each of the person's performances beside the whole one; both count the same."""
 FOLDS = 3
@@ -57,73 +56,38 @@ class Learned:
 
 @dataclass(frozen=True)
 class _Seen:
-    """Windows as the layers after `KEPT` get them: outputs by module, and labels (n,)."""
+    """Windows as the layers that learn get them: features, each (n, k), and labels (n,)."""
 
-    outputs: dict[str, tuple[Tensor, ...]]
+    features: list[Tensor]
     labels: Tensor
 
     def rows(self, index: IntArray) -> "_Seen":
         """Those at these places."""
         some = torch.from_numpy(index)
-        outputs = {name: tuple(x[some] for x in each) for name, each in self.outputs.items()}
-        return _Seen(outputs, self.labels[some])
-
-
-class _Known(nn.Module):
-    """Stands for a module whose outputs are known."""
-
-    outputs: tuple[Tensor, ...] = ()
-
-    def forward(self, *_: Tensor) -> Tensor | tuple[Tensor, ...]:
-        return self.outputs if len(self.outputs) > 1 else self.outputs[0]
+        return _Seen([each[some] for each in self.features], self.labels[some])
 
 
 def _seen(network: Network, windows: Windows) -> _Seen:
-    """What `KEPT` make of windows: computed once, since it stays while all else is learned."""
-    found: dict[str, list[tuple[Tensor, ...]]] = {}
-
-    def keep(name: str) -> Callable[[nn.Module, object, Tensor | tuple[Tensor, ...]], None]:
-        def hook(_module: nn.Module, _inputs: object, out: Tensor | tuple[Tensor, ...]) -> None:
-            # Series are for modules that are known too; only their rank is still looked at.
-            outputs = out if isinstance(out, tuple) else (out,)
-            found.setdefault(name, []).append(
-                tuple(x[:, :, :1] if x.ndim > 2 else x for x in outputs)
-            )
-
-        return hook
-
-    handles = [
-        getattr(network, name).register_forward_hook(keep(name))
-        for name in KEPT
-        if hasattr(network, name)
-    ]
+    """What a network sees in windows: computed once, since only what it means is learned."""
     # Windows of alike lengths together: little is padded.
     order = np.argsort(windows.lengths, kind="stable")
-    said(network, Windows(*(getattr(windows, name)[order] for name in vars(windows))))
-    for handle in handles:
-        handle.remove()
+    parts = []
+    for begin in range(0, len(windows), BATCH):
+        rows = order[begin : begin + BATCH]
+        tracks = [windows.sticks[k, : windows.lengths[k]] for k in rows]
+        with torch.no_grad():
+            part = inputs_of(padded(tracks, windows.labels[rows]), FULL_YAW_RADPS)
+            parts.append(network.features(*part))
     back = torch.from_numpy(np.argsort(order))
-    outputs = {
-        name: tuple(torch.cat(parts)[back] for parts in zip(*each, strict=True))
-        for name, each in found.items()
-    }
-    return _Seen(outputs, torch.from_numpy(windows.labels))
-
-
-def _answers(network: Network, seen: _Seen) -> tuple[Tensor, Tensor]:
-    """Logits of a network whose `KEPT` are `_Known`."""
-    for name, outputs in seen.outputs.items():
-        getattr(network, name).outputs = outputs
-    nothing = torch.empty(0)
-    logits, meant = network(nothing, nothing, nothing, nothing)
-    return logits, meant
+    features = [torch.cat(each)[back] for each in zip(*parts, strict=True)]
+    return _Seen(features, torch.from_numpy(windows.labels))
 
 
 class Adaptation:
     """Adapts a network to one person after the other, always from the same beginning.
 
-    What is made of windows below the layers that learn is computed once, so that hundreds of steps
-    cost about a second. Batch norms and calibration stay as they are.
+    What is made of windows below the layers that learn is computed once, so that a hundred steps
+    cost less than a second. Norms and calibration stay as they are.
 
     Args:
         fitted: the network to begin with.
@@ -136,18 +100,16 @@ class Adaptation:
         self._fitted, self._seed = fitted, seed
         rng = np.random.default_rng(seed)
         windows = joined([seen_after(others, None), random_windows(others, rng, augment=False)])
-        self._others = _seen(fitted.network, windows)
         self._base = copy.deepcopy(fitted.network).eval().requires_grad_(False)
-        for name in self._others.outputs:
-            setattr(self._base, name, _Known())
-        logits, meant = _answers(self._base, self._others)
+        self._others = _seen(self._base, windows)
+        logits, meant = self._base.answers(self._others.features)
         self._old = torch.softmax(logits, 1), torch.sigmoid(meant)
 
     def to(self, own: Examples) -> Learned:
         """Learn a person's performances, if those left out on trial gain by it."""
         rng = np.random.default_rng(self._seed)
         cuts = [random_windows(own, rng, augment=False) for _ in range(CUTS)]
-        seen = _seen(self._fitted.network, joined([seen_after(own, None), *cuts]))
+        seen = _seen(self._base, joined([seen_after(own, None), *cuts]))
         number = np.tile(np.arange(len(own)), 1 + CUTS)
         fold = np.empty(len(own), dtype=np.int64)
         for label in np.unique(own.labels):
@@ -160,7 +122,7 @@ class Adaptation:
                 continue
             part = self._learned(seen, np.flatnonzero(fold[number] != left_out), len(own))
             then[held], now[held] = (
-                _answers(network, seen.rows(held))[0].detach().argmax(1).numpy()
+                network.answers(seen.rows(held).features)[0].argmax(1).numpy()
                 for network in (self._base, part)
             )
         meant = own.labels != NONE_INDEX
@@ -168,19 +130,17 @@ class Adaptation:
         before, after = weighted_f1(truth, then), weighted_f1(truth, now)
         if (now == truth).sum() <= (then == truth).sum():
             return Learned(self._fitted, before, after, of_use=False)
-        learned = self._learned(seen, np.arange(len(number)), len(own))
-        network = copy.deepcopy(self._fitted.network)
-        network.load_state_dict(learned.state_dict(), strict=False)
+        network = self._learned(seen, np.arange(len(number)), len(own))
         return Learned(replace(self._fitted, network=network), before, after, of_use=True)
 
     def _learned(self, own: _Seen, rows: IntArray, whole: int) -> Network:
-        """The layers after `KEPT`, fitted to some of a person's windows; the first are whole."""
+        """A network fitted to some of a person's windows, of which the first are whole ones."""
         rng = np.random.default_rng(self._seed)
         network = copy.deepcopy(self._base)
         moving = {
             name: weights.requires_grad_()
             for name, weights in network.named_parameters()
-            if not name.startswith(STANDARDISES)
+            if name.startswith(LEARNING)
         }
         before = {name: weights.detach().clone() for name, weights in moving.items()}
         optimiser = torch.optim.Adam(moving.values(), lr=LEARNING_RATE)
@@ -190,9 +150,9 @@ class Adaptation:
             optimiser.zero_grad()
             drawn = np.concatenate([rng.choice(part, OWN_BATCH // 2) for part in (wholes, cuts)])
             shown = own.rows(drawn)
-            loss = OWN_WEIGHT * loss_of(*_answers(network, shown), shown.labels)
+            loss = OWN_WEIGHT * loss_of(*network.answers(shown.features), shown.labels)
             index = rng.integers(len(self._others.labels), size=OTHERS_BATCH)
-            logits, meant = _answers(network, self._others.rows(index))
+            logits, meant = network.answers(self._others.rows(index).features)
             old_shapes, old_meant = (old[torch.from_numpy(index)] for old in self._old)
             loss = loss + F.cross_entropy(logits, old_shapes)
             loss = loss + F.binary_cross_entropy_with_logits(meant, old_meant)

@@ -88,12 +88,10 @@ def adaptation_study(
 
 
 def shown_and_judged(primitives: list[Primitive]) -> tuple[Examples, Examples]:
-    """The first `SHOWN` performances of each label, and the others."""
-    turns = [
-        sum(before.label == one.label for before in primitives[:place])
-        for place, one in enumerate(primitives)
-    ]
-    parts = zip(turns, primitives, strict=True)
-    shown = [one for turn, one in parts if turn < SHOWN]
-    judged = [one for turn, one in zip(turns, primitives, strict=True) if turn >= SHOWN]
+    """The first `SHOWN` performances of each primitive, and the others."""
+    shown, judged = [], []
+    for label in PRIMITIVES:
+        performed = [one for one in primitives if one.label == label]
+        shown += performed[:SHOWN]
+        judged += performed[SHOWN:]
     return examples_of(shown), examples_of(judged)
