@@ -56,13 +56,15 @@ class Variant:
 HALF = Architecture(width=Architecture.width // 2, summary=Architecture.summary // 2)
 VARIANTS = (
     Variant("as shipped"),
-    Variant("no summary of the geometry", Architecture(summary=0)),
+    Variant("no features of the whole window", Architecture(summary=0)),
     Variant("convolutions see sticks, no geometry", Architecture(geometry=False)),
     Variant("neither: sticks alone", Architecture(summary=0, geometry=False)),
     Variant("no convolutions and GRUs", Architecture(width=0)),
     Variant("one softmax, no decisions", Architecture(decisions=False)),
     Variant("last state only, no pooling", Architecture(pooling=("last",))),
     Variant("half the width", HALF),
+    Variant("no noise on the features", Architecture(noise=0.0)),
+    Variant("series are never absent", Architecture(absent=0.0)),
     Variant("whole primitives only, no cuts", cuts=False),
     Variant("no splices, mirrors and scales", augment=False),
 )

@@ -71,9 +71,9 @@ sets. Classes are as frequent as in the thesis, and a fifth of all is none of th
 ## Figures on people held out
 
 F1 is weighted by class; the interval is 95 % over people (bootstrap). "F1 2 s" is asked two seconds
-after the motion began. ECE is the expected calibration error at the end of the primitive, in 15
-bins. AUROC tells primitives from none. The comparison with other classifiers, over five seeds and
-with whole families held out, is in docs/evaluation.md.
+after the motion began. ECE is the expected calibration error over all these moments, in 15 bins.
+AUROC tells primitives from none, at the end. The comparison with other classifiers, over five seeds
+and with whole families held out, is in docs/evaluation.md.
 
 | population | primitives of people | F1 | 95 % interval | {early} | ECE | AUROC |
 |{"---|" * (6 + len(first.early))}

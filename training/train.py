@@ -84,7 +84,7 @@ class Judged:
         name: of the population.
         whole: at the end of each primitive.
         early: (seconds since the motion began, score).
-        calibration: expected calibration error at the end.
+        calibration: expected calibration error, over the end and all early moments.
         auroc: of `meant`, primitives against none, at the end.
         families: weighted F1 by kind of people, at the end.
     """
@@ -138,15 +138,17 @@ def judge(name: str, model: OnnxModel, examples: Examples) -> Judged:
     truth, people = shapes.labels, shapes.operators
     said = whole[is_meant].argmax(axis=1)
     classes = len(PRIMITIVES)
-    early = []
+    early, answers = [], [whole[is_meant]]
     for after_s in MOMENTS_S:
-        then = answers_of(model, seen_after(shapes, after_s))[0].argmax(axis=1)
-        early.append((after_s, score(truth, then, people, classes, 0)))
+        then = answers_of(model, seen_after(shapes, after_s))[0]
+        early.append((after_s, score(truth, then.argmax(axis=1), people, classes, 0)))
+        answers.append(then)
+    bins = confidence_bins(np.concatenate(answers), np.tile(truth, len(answers)))
     return Judged(
         name,
         score(truth, said, people, classes, 0),
         tuple(early),
-        calibration_error(confidence_bins(whole[is_meant], truth)),
+        calibration_error(bins),
         none_auroc(meant, is_meant),
         {
             str(kind): weighted_f1(truth[shapes.families == kind], said[shapes.families == kind])
