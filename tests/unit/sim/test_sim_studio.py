@@ -57,7 +57,7 @@ def test_a_slow_renderer_drops_pictures_and_holds_up_nobody(
     taken: list[Message] = []
     arrived = threading.Event()
 
-    def publish(_topic: str, message: Message) -> None:
+    def publish(_shot: Shot, message: Image) -> None:
         taken.append(message)
         if len(taken) == 2:
             arrived.set()
@@ -83,7 +83,7 @@ def test_two_shots_from_below_may_come_while_a_front_picture_is_drawn(
     renderer = SlowRenderer()
     monkeypatch.setattr(studio, "open_renderer", lambda _choice: renderer)
     taken: list[Message] = []
-    cameras = studio.Studio("gl", CAMERAS, 80, lambda _topic, message: taken.append(message))
+    cameras = studio.Studio("gl", CAMERAS, 80, lambda _shot, message: taken.append(message))
     cameras.take(front_at(0))
     assert renderer.drawing.wait(5.0)
     for count in range(1, 5):
@@ -149,7 +149,7 @@ def test_a_renderer_that_fails_is_told_and_ends_only_the_pictures(
         raise NoOpenGlError("none here")
 
     monkeypatch.setattr(studio, "open_renderer", fail)
-    cameras = studio.Studio("gl", CAMERAS, 80, lambda _topic, _message: None)
+    cameras = studio.Studio("gl", CAMERAS, 80, lambda _shot, _message: None)
     cameras.close()
     assert cameras.failure == "none here"
     cameras.take(front_at(1))
