@@ -126,7 +126,9 @@ def _answered(results: Results, path: Path) -> str:
         panel.set_xticks(at, list(MOMENTS))
         panel.set_xlabel("time since the motion began")
         panel.set_ylim(-2.0, 102.0)
-        panel.legend(fontsize=9, frameon=False)
+        panel.legend(
+            fontsize=9, frameon=False, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.18)
+        )
         _clean(panel)
     _save(figure, path)
     return (

@@ -28,9 +28,10 @@ td,th{padding:.25em .8em;border-bottom:1px solid #ddd;text-align:left}
 .met{color:#006b4f;font-weight:600}.short{color:#a33c00;font-weight:600}img{max-width:100%}"""
 
 
-def _numbers(results: Results) -> str:
-    """What was counted, for captions."""
-    seeds = max((len(found) for found in results.judged.values()), default=0)
+def _numbers(results: Results, model: str | None = None) -> str:
+    """What was counted, for captions: of one classifier, or of that with most seeds."""
+    counts = {name: len(found) for name, found in results.judged.items()}
+    seeds = max(counts.values(), default=0) if model is None else counts.get(model, 0)
     return f"{seeds} {'seed' if seeds == 1 else 'seeds'}; mean ± 95 % interval over seeds (Student)"
 
 
@@ -38,7 +39,7 @@ def _bars(results: Results) -> Table:
     rows = tuple((b.question, b.bar, b.found, b.peer, b.verdict) for b in bars(results))
     return Table(
         "Against the bars",
-        f"{_numbers(results)}. A family is left out in one seed, so its F1 has no interval.",
+        f"Ours: {_numbers(results, OURS)}. A family is left out in one seed: no interval.",
         ("question", "bar", "ours", "best peer", "verdict"),
         rows,
     )
@@ -73,7 +74,8 @@ def _classifiers(results: Results) -> Table:
     return Table(
         "Classifiers, at the end of a primitive",
         f"Weighted F1. {_numbers(results)}; calibrated people: {count} primitives in all;"
-        " left out: each family is one value. ECE: over all moments." + own,
+        " left out: each family is one value. ECE: over all moments. Trains in: by the clock, on a"
+        " core that other work may have shared." + own,
         (
             "classifier",
             "seeds",
@@ -139,7 +141,7 @@ def _flown(results: Results) -> Table:
         rows.append((f"nothing, {kind}: answered", *(share.text(1, 100) for share in shares)))
     return Table(
         "What flies: only answers that are sure enough",
-        f"Ours, % of windows, with the threshold of each seed's model. {_numbers(results)},"
+        f"Ours, % of windows, with the threshold of each seed's model. {_numbers(results, OURS)},"
         " or over families. Whatever is answered to nothing is wrong. In flight most rests and"
         " turns on the spot never reach the model: nothing has moved yet.",
         ("windows", *MOMENTS),
@@ -160,7 +162,8 @@ def _nothing(results: Results) -> Table:
     return Table(
         "None against the four",
         "Area under the curve of `meant`, ours, against primitives of as many seconds by people of"
-        f" families that are known. n: performances of nothing a seed. {_numbers(results)}.",
+        f" families that are known. n: performances of nothing a seed."
+        f" {_numbers(results, OURS)}.",
         ("kind of nothing", "n", *MOMENTS, "all moments"),
         rows,
     )
