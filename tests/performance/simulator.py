@@ -319,8 +319,14 @@ def soak(duration_s: float, progress: Progress) -> list[Row]:
         def on_imu(imu: m.Imu, _arrival_ns: int) -> None:
             lags_ms.append((clock.utc_ns() - imu.stamp) / 1e6)
 
+        pictures: list[int] = []
         node.on("imu", on_imu, depth=256)
+        node.on("camera/front", lambda _picture, arrival_ns: pictures.append(arrival_ns))
         stop = threading.Event()
+        while not pictures:
+            node.spin()
+            system.check()
+            stop.wait(0.1)
         process = psutil.Process(system.processes["sim"].pid)
         task = progress.add_task(f"{duration_s:.0f} s of real time", total=duration_s)
         begin_ns = clock.monotonic_ns()
