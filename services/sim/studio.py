@@ -10,6 +10,7 @@ from typing import Literal
 import cv2
 
 from common import messages as m
+from common.camera import Lens
 from common.clock import NS_PER_S
 from services.sim.cameras import Camera, Shot
 from services.sim.optics import Renderer, exposed, noisy
@@ -19,9 +20,11 @@ from services.sim.textures import Picture
 
 log = logging.getLogger(__name__)
 
-LONGEST_WAIT_NS = 30_000_000
-"""Less than the front camera's period, so of its shots the newest alone waits; of those of the
-camera below one more, for two may come while a front picture is drawn."""
+PICTURES = 2
+"""Of one lens; renderers have so many places for them."""
+LONGEST_WAIT_NS = 50_000_000
+"""Of shots: a front picture and those from below that fall due while it is drawn, and a moment in
+which others have the processor."""
 
 Choice = Literal["auto", "gl", "tiny", "none"]
 
@@ -93,7 +96,8 @@ class Studio:
         self._stopping = False
         self._ready = False
         self._drawing = False
-        self._encoding = False
+        self._encoding: Counter[Lens] = Counter()
+        self._drawn_ns: dict[tuple[int, str], int] = {}
         self.dropped: Counter[str] = Counter()
         self.renderer = "starting"
         self.failure = ""
@@ -107,6 +111,7 @@ class Studio:
             if cameras is not None:
                 self._cameras = _by_owner(cameras)
             self._shots.clear()
+            self._drawn_ns.clear()
             self._wake.notify_all()
 
     def take(self, shots: Sequence[Shot]) -> None:
@@ -121,7 +126,7 @@ class Studio:
         """Wait until all pictures that were asked for are taken."""
         with self._wake:
             while (
-                self._shots or self._scene or self._drawing or self._encoding
+                self._shots or self._scene or self._drawing or self._encoding.total()
             ) and not self.failure:
                 self._wake.wait()
 
@@ -152,25 +157,25 @@ class Studio:
         with self._wake:
             self._drawing = False
             self._wake.notify_all()
-            while not (self._shots or self._scene or self._stopping or self.failure):
+            while True:
+                if self._stopping or self.failure:
+                    return False
+                free = [shot for shot in self._shots if self._has_place(shot)]
+                if free or self._scene:
+                    break
                 self._wake.wait()
-            if self._stopping or self.failure:
-                return False
             scene, self._scene = self._scene, None
-            shot = min(self._shots, key=self._due_ns) if self._shots else None
+            shot = max(free, key=self._gap_periods) if free else None
             if shot is not None:
-                self._shots.remove(shot)
                 camera = self._camera_of(shot)
+                self._drawn_ns[shot.vehicle, shot.topic] = shot.stamp_ns
+                self._shots.remove(shot)
+                self._encoding[camera.lens] += 1
             self._drawing = True
         if scene is not None:
             renderer.load(scene)
         if shot is not None:
             picture = exposed(renderer, camera, shot)
-            with self._wake:
-                # One at a time, since the next but one may overwrite it.
-                while self._encoding:
-                    self._wake.wait()
-                self._encoding = True
             encoder.submit(self._hand_out, picture, camera, shot)
         return True
 
@@ -181,7 +186,7 @@ class Studio:
             self._fail(error)
         finally:
             with self._wake:
-                self._encoding = False
+                self._encoding[camera.lens] -= 1
                 self._wake.notify_all()
 
     def _fail(self, error: Exception) -> None:
@@ -193,9 +198,22 @@ class Studio:
     def _camera_of(self, shot: Shot) -> Camera:
         return self._cameras[shot.vehicle, shot.topic]
 
-    def _due_ns(self, shot: Shot) -> float:
-        """When its camera takes the next one: what is due first is drawn first."""
-        return shot.stamp_ns + NS_PER_S / self._camera_of(shot).fps
+    def _has_place(self, shot: Shot) -> bool:
+        """Whether its picture would not overwrite one that is still to be encoded."""
+        return self._encoding[self._camera_of(shot).lens] < PICTURES
+
+    def _gap_periods(self, shot: Shot) -> tuple[float, int]:
+        """How many of its periods ago a camera's last picture is of; then the oldest shot.
+
+        So no camera starves when not all pictures can be drawn: what is due first would give all
+        to the fastest camera.
+        """
+        before_ns = self._drawn_ns.get((shot.vehicle, shot.topic), 0)
+        gap_s = (self._newest_ns() - before_ns) / NS_PER_S
+        return gap_s * self._camera_of(shot).fps, -shot.stamp_ns
+
+    def _newest_ns(self) -> int:
+        return max(shot.stamp_ns for shot in self._shots)
 
     def _drop_before(self, newest: Shot) -> None:
         """Drop what has waited too long for the camera of the newest shot."""

@@ -92,7 +92,7 @@ def _calibrated(results: Results) -> list[Bar]:
             f"<= {ARC_SINE:.0%}",
             f"{swapped[OURS].text(1, 100)} %",
             "-" if least is None else f"{least} {swapped[least].text(1, 100)} %",
-            at_most(swapped[OURS].mean, ARC_SINE),
+            at_most(100.0 * swapped[OURS].mean, 100.0 * ARC_SINE, 1),
         ),
     ]
 

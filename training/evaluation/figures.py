@@ -231,7 +231,7 @@ def _losses(results: Results, path: Path) -> str:
     _save(figure, path)
     return (
         "Figure 5.6 of the thesis, remade: training and validation loss, a line a seed. Ours learns"
-        " from augmented windows and by more terms than it is judged by."
+        " from augmented, mixed and noisy windows, and is judged on plain ones."
     )
 
 

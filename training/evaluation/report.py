@@ -39,7 +39,8 @@ def _bars(results: Results) -> Table:
     rows = tuple((b.question, b.bar, b.found, b.peer, b.verdict) for b in bars(results))
     return Table(
         "Against the bars",
-        f"Ours: {_numbers(results, OURS)}. A family is left out in one seed: no interval.",
+        f"Ours: {_numbers(results, OURS)}. A family is left out in one seed: no interval."
+        " Intervals of adaptation and of the mean over families are over people and families.",
         ("question", "bar", "ours", "best peer", "verdict"),
         rows,
     )
