@@ -7,6 +7,7 @@ flight to the bit.
 
 import multiprocessing
 import os
+import signal
 from collections import deque
 from contextlib import suppress
 from multiprocessing.connection import Connection
@@ -147,6 +148,8 @@ class _Painter:
 
 def _paint(pipe: Connection, config: Config) -> None:
     """Answer scenes and shots until the other end is closed."""
+    # The key goes to all processes; the flight's end closes the pipe.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     cameras = {camera.topic: camera for camera in cameras_of(config)}
     os.environ.setdefault("LP_NUM_THREADS", LLVMPIPE_THREADS)
     try:

@@ -26,8 +26,8 @@ APART_M = 1.0
 """Between the vehicles' start places."""
 _ROOM_M = 0.2
 """What is left free around a start place."""
-_ABREAST = (0.0, 1.0, -1.0, 2.0, -2.0)
-"""Start places of a row, to the left of its middle."""
+_ABREAST = (0.0, 1.0, -1.0)
+"""Start places of a row, to the left of its middle: no more than a lane is wide."""
 _ROWS = 50
 
 
@@ -170,16 +170,19 @@ class Simulation:
         world = worlds.load(world_name)
         stage = Stage(world, STEP_S)
         cast = []
-        for actor in self.actors:
-            hull = stage.add(build if actor is asked else actor.plant.build)
-            place = _start_place(world, hull, actor)
-            if actor is asked:
-                place = _asked(request, *place)
-                hull.place(*place)
-                if hull.overlaps():
-                    stage.close()
-                    raise _OCCUPIED
-            cast.append((hull, place))
+        try:
+            for actor in self.actors:
+                hull = stage.add(build if actor is asked else actor.plant.build)
+                place = _start_place(world, hull, actor)
+                if actor is asked:
+                    place = _asked(request, *place)
+                    hull.place(*place)
+                    if hull.overlaps():
+                        raise _OCCUPIED
+                cast.append((hull, place))
+        except ResetError:
+            stage.close()
+            raise
         for actor, (hull, place) in zip(self.actors, cast, strict=True):
             actor.enter(stage, world.name, hull, *place)
         self._stage.close()

@@ -156,7 +156,7 @@ class Vehicle:
 
     def _spend(self, loads: Loads) -> None:
         # A rotor's power grows as thrust^1.5.
-        share = loads.thrust_n / self._weight_n
+        share = max(0.0, loads.thrust_n) / self._weight_n
         self.battery = max(0.0, self.battery - self._drain * share * share**0.5)
 
     def _listen(self, command: Command | None, state: BodyState, touch: Touch) -> None:
