@@ -89,6 +89,7 @@ class Node:
         self._sequence: dict[str, int] = {}
         self._closers: list[Callable[[], None]] = []
         self._besides: list[Node] = []
+        self._waiting: Node = self
         self._wake = threading.Condition()
         self._woken = False
         self._latencies_s: deque[float] = deque(maxlen=LATENCY_SAMPLES)
@@ -101,8 +102,7 @@ class Node:
         """The same service of another vehicle, run and closed by this node."""
         other = Node(self.bus, vehicle, self.service, self.clock)
         # One thread waits for all of them, and their main step is one.
-        other._wake, other._latencies_s = self._wake, self._latencies_s
-        other._notify = self._notify  # type: ignore[method-assign]
+        other._waiting, other._latencies_s = self, self._latencies_s
         self._besides.append(other)
         return other
 
@@ -263,9 +263,10 @@ class Node:
         self.publishes(f"health/{self.service}")
 
     def _notify(self) -> None:
-        with self._wake:
-            self._woken = True
-            self._wake.notify()
+        waiting = self._waiting
+        with waiting._wake:
+            waiting._woken = True
+            waiting._wake.notify()
 
     def _next_due_ns(self) -> int:
         return min(timer.due_ns for node in (self, *self._besides) for timer in node._timers)

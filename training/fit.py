@@ -80,7 +80,6 @@ class Epoch:
 
     number: int
     training_loss: float
-    training_accuracy: float
     validation_loss: float
     validation_accuracy: float
     is_best: bool
@@ -242,16 +241,15 @@ class Training:
         tracks = self._tracks()
         labels = self._examples.labels
         self._network.train()
-        loss_sum, right = 0.0, 0.0
+        loss_sum = 0.0
         # Not by length, which would pad less: batch norms would see other lengths than they fly.
         size = self._budget.batch
         order = self._rng.permutation(len(tracks))
         batches = [order[begin : begin + size] for begin in range(0, len(order), size)]
         for done, rows in enumerate(batches, 1):
             windows = padded([tracks[k] for k in rows], labels[rows])
-            loss, accuracy = self._step(windows)
+            loss = self._step(windows)
             loss_sum += loss * len(rows)
-            right += accuracy * len(rows)
             on_batch(done, len(batches))
         logits, meant = said(self._average, self.held)
         held_loss = float(loss_of(logits, meant, self._held_labels).item())
@@ -261,7 +259,6 @@ class Training:
         epoch = Epoch(
             len(self.history) + 1,
             loss_sum / len(labels),
-            right / len(labels),
             held_loss,
             accuracy_of(logits, self._held_labels),
             is_best,
@@ -314,7 +311,12 @@ class Training:
                 f"checkpoint {path}: is of {name}, not of {self._name};"
                 " run without --resume to begin anew"
             )
-        self._network.load_state_dict(state["network"])
+        try:
+            self._network.load_state_dict(state["network"])
+        except RuntimeError:
+            raise OSError(
+                f"checkpoint {path}: is of another network; run without --resume to begin anew"
+            ) from None
         self._average.load_state_dict(state["average"])
         self._best = state["best"]
         self._optimiser.load_state_dict(state["optimiser"])
@@ -335,8 +337,8 @@ class Training:
             return random_tracks(self._examples, self._rng, augment=self._augment)
         return whole_tracks(self._examples)
 
-    def _step(self, windows: Windows) -> tuple[float, float]:
-        """One step of the optimiser; loss and accuracy of the batch."""
+    def _step(self, windows: Windows) -> float:
+        """One step of the optimiser; loss of the batch."""
         labels = torch.from_numpy(windows.labels)
         self._optimiser.zero_grad()
         features = self._network.features(*inputs_of(windows, FULL_YAW_RADPS))
@@ -361,7 +363,7 @@ class Training:
             # Batch norms' means and variances are running means already.
             for kept, now in zip(self._average.buffers(), self._network.buffers(), strict=True):
                 kept.copy_(now)
-        return float(loss.item()), accuracy_of(logits.detach(), labels)
+        return float(loss.item())
 
 
 def calibrated(network: Network, asked: Windows, history: tuple[Epoch, ...] = ()) -> Fitted:

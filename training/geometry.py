@@ -186,11 +186,13 @@ class Geometry(nn.Module):
         determinant = 2.0 * (p * r - uw * uw)
         x, y = (r * uq - uw * wq) / determinant, (p * wq - uw * uq) / determinant
         spread = uu + ww
-        radius = x * x + y * y + spread + RIDGE
-        off = (qq - 2.0 * (x * uq + y * wq)) / radius
-        swept = (ub - wa - x * b + y * a) / radius * count
-        sizes = torch.cat([turned - net, turned + net, off, radius, spread, headings, speeds], 2)
-        # Padding is 0, which is never the largest of these.
+        radius_squared = x * x + y * y + spread + RIDGE
+        off = (qq - 2.0 * (x * uq + y * wq)) / radius_squared
+        swept = (ub - wa - x * b + y * a) / radius_squared * count
+        sizes = torch.cat(
+            [turned - net, turned + net, off, radius_squared, spread, headings, speeds], 2
+        )
+        # Padding is 0: never the largest, but for a stick that is beyond full speed throughout.
         reach = torch.cat([heading, -heading, speed, mask - speed], 2)
         features = torch.cat(
             [

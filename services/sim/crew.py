@@ -1,6 +1,6 @@
 """Which vehicles there are: what `--vehicles` says of their number, kinds and names."""
 
-import re
+import string
 from dataclasses import dataclass
 
 from common.topics import VEHICLE_PATTERN
@@ -61,10 +61,11 @@ def names_of(members: tuple[Member, ...], first: str) -> tuple[str, ...]:
     """
     if members[0].name not in (None, first):
         raise ValueError(f"the first is {first!r}; name it by --vehicle {members[0].name}")
-    stem, digits = re.fullmatch(r"(.*?)(\d*)", first).groups()  # type: ignore[union-attr]
+    stem = first.rstrip(string.digits)
+    number = int(first[len(stem) :] or 0)
     names = [first]
     for offset, member in enumerate(members[1:], start=1):
-        names.append(member.name or f"{stem}{int(digits or 0) + offset}")
+        names.append(member.name or f"{stem}{number + offset}")
     twice = {name for name in names if names.count(name) > 1}
     if twice:
         raise ValueError(f"two are named {min(twice)!r}; name each of them otherwise")
