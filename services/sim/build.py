@@ -23,6 +23,7 @@ class Build:
         hull: what collides, in body coordinates, whose origin is the centre of mass.
         look: what others see, in the same.
         friction: of its hull; pybullet multiplies it by that of what it touches.
+        friction_tipped: the same once it lies on its side or its back.
         front: where the front camera sits.
         down: where the camera that looks down sits.
         sensors: the topics of the instruments that it has.
@@ -33,6 +34,7 @@ class Build:
     hull: tuple[Body, ...]
     look: tuple[Body, ...]
     friction: float = 0.8
+    friction_tipped: float = 0.8
     front: Mount = FRONT
     down: Mount = DOWN
     sensors: frozenset[str] = frozenset({"imu", "altimeter", "camera/front", "camera/down"})

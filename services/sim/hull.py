@@ -18,16 +18,26 @@ KINDS: dict[Shape, int] = {
 }
 _FAR_AWAY_M = 500.0
 RESTITUTION = 0.1
+_TIPPED_COS = math.cos(1.0)
+_CARRIED_COS = math.cos(0.8)
+"""A push that leans less from upright than this carries the vehicle, another bars its way."""
 _MARGIN_M = 0.05
 """Nearer than this to the hull's sphere, contacts are looked for at each step."""
 
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """What the hull presses against."""
+    """What the hull presses against.
+
+    Attributes:
+        ground: the ground.
+        body: what stands there, or another vehicle.
+        side: one of these, and not only from below.
+    """
 
     ground: bool = False
     body: bool = False
+    side: bool = False
 
 
 UNTOUCHED = Touch()
@@ -80,6 +90,8 @@ class Hull:
             **on,
         )
         self._leash_m = 0.0
+        self._frictions = (build.friction, build.friction_tipped)
+        self._is_tipped = False
 
     def remove(self) -> None:
         """Take it out of the world."""
@@ -119,6 +131,10 @@ class Hull:
         """Let the loads act in the next step, beginning at the vehicle's `state`."""
         thrust_n, torque_nm, air_n = loads.thrust_n, loads.torque_nm, loads.air_n
         r = state.rotation
+        if (r[8] < _TIPPED_COS) != self._is_tipped:
+            self._is_tipped = not self._is_tipped
+            friction = self._frictions[self._is_tipped]
+            pybullet.changeDynamics(self._body, -1, lateralFriction=friction, **self._on)
         pybullet.applyExternalForce(
             self._body,
             -1,
@@ -163,8 +179,11 @@ class Hull:
                 return UNTOUCHED
         points = pybullet.getContactPoints(bodyA=self._body, **self._on)
         # Near misses are listed too; only what pushes back is touched.
-        touched = {point[2] for point in points if point[9] > 0.0}
-        return Touch(self._ground in touched, bool(touched - {self._ground}))
+        pressed = [point for point in points if point[9] > 0.0]
+        touched = {point[2] for point in pressed}
+        # The normals point to the vehicle.
+        side = any(point[7][2] < _CARRIED_COS for point in pressed)
+        return Touch(self._ground in touched, bool(touched - {self._ground}), side)
 
     def _is_crowded(self, position_m: Vector3) -> bool:
         """Whether another vehicle is so near that they may touch."""

@@ -58,5 +58,5 @@ class Plant(ABC):
         raise NotImplementedError
 
     @abstractmethod
-    def fall(self, state: BodyState, wind_mps: Vector3) -> Loads:
+    def fall(self, state: BodyState, wind_mps: Vector3, below_m: float) -> Loads:
         """The same while the motors stand still."""

@@ -141,7 +141,7 @@ class Vehicle:
             self.has_news = True
         if now == "landed" or now == "emergency":
             self._plant.restart()
-            return self._plant.fall(state, wind_mps)
+            return self._plant.fall(state, wind_mps, below_m)
         if now == "flying":
             sticks = self._noise.add_to(self._sticks)
             if sticks.vz > 0.0 and state.position_m[2] > self._ceiling_m:

@@ -129,7 +129,7 @@ class ArdronePlant(Plant):
         """
         return self._loads(_SINK, state, wind_mps, 1.0)
 
-    def fall(self, state: BodyState, wind_mps: Vector3) -> Loads:
+    def fall(self, state: BodyState, wind_mps: Vector3, below_m: float) -> Loads:
         """Only the air acts."""
         drag = MASS_KG * DRAG_PER_S
         vx, vy, vz = (drag * (w - v) for w, v in zip(wind_mps, state.velocity_mps, strict=True))

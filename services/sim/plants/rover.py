@@ -29,6 +29,8 @@ _HALF_TRACK_M = 0.19
 _FOOT_M = (0.2, 0.165)
 _ON_GROUND_M = 0.03
 """Higher than this above where they rest, the wheels hang in the air."""
+_UPRIGHT_COS = 0.5
+"""Tilted more, it does not stand on its wheels."""
 _INERTIA_KGM2: Vector3 = (
     MASS_KG / 12.0 * (SIZE_M[1] ** 2 + SIZE_M[2] ** 2),
     MASS_KG / 12.0 * (SIZE_M[0] ** 2 + SIZE_M[2] ** 2),
@@ -85,20 +87,20 @@ class RoverPlant(Plant):
         goal_mps, goal_radps = FORWARD_MPS * clip(sticks.vx, 1.0), TURN_RADPS * clip(sticks.wz, 1.0)
         self._wheels_mps += clip(share * (goal_mps - self._wheels_mps), MOTOR_MPS2 * step_s)
         self._turn_radps += clip(share * (goal_radps - self._turn_radps), MOTOR_RADPS2 * step_s)
-        if below_m > SIZE_M[2] / 2.0 + _ON_GROUND_M:
-            return NO_LOADS
-        return self._traction(state, self._wheels_mps, self._turn_radps)
+        return self._traction(state, below_m, self._wheels_mps, self._turn_radps)
 
-    def fall(self, state: BodyState, wind_mps: Vector3) -> Loads:
+    def fall(self, state: BodyState, wind_mps: Vector3, below_m: float) -> Loads:
         """The wheels are locked."""
-        return self._traction(state, 0.0, 0.0)
+        return self._traction(state, below_m, 0.0, 0.0)
 
-    def _traction(self, state: BodyState, forward_mps: float, turn_radps: float) -> Loads:
+    def _traction(
+        self, state: BodyState, below_m: float, forward_mps: float, turn_radps: float
+    ) -> Loads:
         """What the ground does to wheels that turn so, sideways slip included."""
         r, (vx, vy, _) = state.rotation, state.velocity_mps
-        level = math.hypot(r[0], r[3])
-        if level < 0.5:
+        if below_m > SIZE_M[2] / 2.0 + _ON_GROUND_M or r[8] < _UPRIGHT_COS:
             return NO_LOADS
+        level = math.hypot(r[0], r[3])
         cos, sin = r[0] / level, r[3] / level
         ahead = (forward_mps - (cos * vx + sin * vy)) / self._step_s
         left = (sin * vx - cos * vy) / self._step_s

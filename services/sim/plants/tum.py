@@ -64,7 +64,7 @@ class TumPlant(Plant):
         """A fifth less thrust."""
         return self._loads(_NEUTRAL, state, wind_mps, _LANDING_LIFT)
 
-    def fall(self, state: BodyState, wind_mps: Vector3) -> Loads:
+    def fall(self, state: BodyState, wind_mps: Vector3, below_m: float) -> Loads:
         """Nothing acts."""
         return NO_LOADS
 

@@ -2,6 +2,8 @@
 
 import itertools
 import math
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -147,6 +149,87 @@ def test_a_wall_stops_it_and_counts() -> None:
     assert simulation.status().collisions == 1
     assert abs(simulation.state.velocity_mps[1]) < 0.05
     assert simulation.state.position_m[1] < 1.5
+    simulation.close()
+
+
+LEDGE = """\
+description: a ledge 1 m high with a wall on it
+bodies:
+  - {shape: box, size_m: [4, 4, 1], position_m: [0, 0, 0.5], texture: concrete}
+  - {shape: box, size_m: [0.5, 4, 2], position_m: [-1.75, 0, 1], texture: concrete}
+"""
+
+
+@pytest.fixture
+def ledge(tmp_path: Path) -> Iterator[Simulation]:
+    file = tmp_path / "ledge.yaml"
+    file.write_text(LEDGE)
+    simulation = standing(str(file))
+    simulation.reset(ResetRequest(position=(0.0, 0.0, 1.0 + REST_M)))
+    yield simulation
+    simulation.close()
+
+
+def test_in_the_air_neither_sticks_nor_brakes_change_its_way(ledge: Simulation) -> None:
+    fly(ledge, 1.5, Sticks(vx=1.0))
+    while ledge.state.position_m[2] > 1.0:
+        fly(ledge, 0.02, Sticks(vx=1.0))
+    before = ledge.state.velocity_mps
+    assert before[0] > 0.9
+    states, _ = fly(ledge, 0.1, Sticks(vx=-1.0, wz=1.0), action="emergency")
+    assert ledge.status().state == "emergency"
+    assert ledge.state.position_m[2] > REST_M + 0.1
+    for state in states:
+        assert state.velocity_mps[:2] == pytest.approx(before[:2], abs=1e-6)
+
+
+def test_tipped_over_an_edge_it_says_so_scrapes_to_a_halt_and_is_reset(ledge: Simulation) -> None:
+    _, messages = fly(ledge, 5.0, Sticks(vx=1.0))
+    told = [message for topic, message in messages if topic == "vehicle"]
+    states = [message.state for message in told]  # type: ignore[attr-defined]
+    assert states[0] == "flying"
+    assert states[-1] == "emergency"
+    assert told[-1].collisions >= 1  # type: ignore[attr-defined]
+    assert ledge.state.tilt_rad > 1.0
+    assert math.hypot(*ledge.state.velocity_mps) < 0.01
+    place = ledge.state.position_m
+    for action in ("land", "takeoff", "fly"):
+        fly(ledge, 0.2, Sticks(vx=1.0), action=action)  # type: ignore[arg-type]
+    assert ledge.status().state == "emergency"
+    assert ledge.state.position_m == pytest.approx(place, abs=0.01)
+    status = ledge.reset(ResetRequest())
+    assert (status.state, status.collisions) == ("flying", 0)
+    fly(ledge, 0.5, Sticks(vx=1.0))
+    # On its wheels again: the hull does not scrape.
+    assert ledge.state.velocity_mps[0] == pytest.approx(FORWARD_MPS, rel=0.05)
+
+
+def test_a_wall_is_counted_where_it_stands_on_something_too(ledge: Simulation) -> None:
+    fly(ledge, 0.5)
+    assert ledge.status().collisions == 0
+    fly(ledge, 3.0, Sticks(vx=-1.0))
+    assert ledge.status().collisions == 1
+
+
+@pytest.mark.parametrize(("height_m", "collisions"), [(0.0, 0), (0.03, 0), (0.5, 1)])
+def test_a_hard_fall_is_counted(height_m: float, collisions: int) -> None:
+    simulation = standing()
+    simulation.reset(ResetRequest(position=(0.0, 0.0, REST_M + height_m)))
+    fly(simulation, 1.0, Sticks(vx=0.5))
+    assert simulation.status().collisions == collisions
+    simulation.close()
+
+
+def test_its_battery_runs_down_and_stops_it_and_a_reset_charges_it() -> None:
+    simulation = Simulation(Config(world="empty", plant="rover", battery=0.0001, sensor_noise=0.0))
+    fly(simulation, 1.0, Sticks(vx=1.0))
+    assert simulation.status().battery == pytest.approx(0.0001 - 1.0 / (4 * 3600.0), rel=0.01)
+    fly(simulation, 2.0, Sticks(vx=1.0))
+    status = simulation.status()
+    assert (status.state, status.battery) == ("emergency", 0.0)
+    assert math.hypot(*simulation.state.velocity_mps) < 0.01
+    status = simulation.reset(ResetRequest())
+    assert (status.state, status.battery) == ("flying", 0.0001)
     simulation.close()
 
 
