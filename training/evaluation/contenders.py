@@ -17,6 +17,7 @@ CODE: dict[str, tuple[str, ...]] = {
         "training/calibration.py",
         "training/export.py",
         "training/evaluation/ours.py",
+        "training/evaluation/rejection.py",
         "services/classifier/window.py",
     ),
     "cnn-gru-thesis": _THESIS,

@@ -24,6 +24,7 @@ from training.evaluation.ours import Ours
 from training.evaluation.report import write
 from training.evaluation.results import Results
 from training.evaluation.tables import Table
+from training.evaluation.unusual import PEOPLE
 from training.fit import THREADS
 from training.generator.calibration import machine_f1
 from training.generator.dataset import THESIS
@@ -31,8 +32,6 @@ from training.generator.dataset import THESIS
 ALL_SEEDS = tuple(range(SEEDS))
 OWN_SPLITS = {"full": 20, "quick": 1}
 """So many sets of people on whom the thesis' machine does what it did in the thesis."""
-UNUSUAL = {"full": (12, 4), "quick": (2, 1)}
-"""So many people with odd ways and clumsy ones show five performances of each primitive."""
 LATENCY_WINDOWS = {"full": 5000, "quick": 500}
 HOVER, ADAPTATION = "hover", "adapted"
 """What is asked of our network besides, and kept by itself."""
@@ -160,7 +159,7 @@ class Evaluation:
             self._cache.keep(held, hover, OURS, HOVER, seed)
         if self._cache.find(adaptation, OURS, ADAPTATION, seed) is None:
             tell(f"{OURS}: adapts", 0, 1)
-            study = adapted(ours, people(), seed, *UNUSUAL[self._order.size])
+            study = adapted(ours, people(), seed, *PEOPLE[self._order.size])
             self._cache.keep(study, adaptation, OURS, ADAPTATION, seed)
 
     def _kept(self, name: str, seed: int) -> dict[str, Any] | None:

@@ -14,6 +14,8 @@ from training.labels import PRIMITIVES
 from training.scores import weighted_f1
 from training.windows import NONE_INDEX, Examples, examples_of, seen_after
 
+PEOPLE = {"full": (12, 4), "quick": (2, 1)}
+"""So many with odd ways and clumsy ones, by size of the evaluation."""
 SHOWN, JUDGED = 5, 20
 """Performances of each primitive and person: to learn from, to judge on."""
 CLUMSY = Population("clumsy", FAMILIES, difficulty=2.0)

@@ -8,10 +8,10 @@ import pytest
 from cli.main import main
 from common.clock import ManualClock
 from training.evaluation import run
-from training.evaluation.contenders import CODE, CONTENDERS
+from training.evaluation.contenders import CODE
 from training.evaluation.folds import SIZES
 from training.evaluation.marks import Marks
-from training.evaluation.names import OURS
+from training.evaluation.names import OURS, WHOLE
 from training.evaluation.ours import Ours
 from training.evaluation.report import BEGIN
 from training.evaluation.run import Evaluation, Order
@@ -45,10 +45,59 @@ def test_every_classifier_names_source_files_that_are_there() -> None:
     assert all((ROOT / path).is_file() for paths in CODE.values() for path in paths)
 
 
-def test_marks_differ_by_size_classifier_and_question() -> None:
-    full, quick = Marks(SIZES["full"]), Marks(SIZES["quick"])
-    marks = {full.classifier(OURS), quick.classifier(OURS), full.classifier("svm")}
-    assert len(marks | {full.hover(), full.adaptation(), full.machine()}) == 6
+def marks_of(size: str = "full") -> dict[str, str]:
+    """By what is marked: two classifiers, and what ours is asked besides."""
+    code_of.cache_clear()
+    marks = Marks(SIZES[size])
+    besides = {"hover": marks.hover(), "adapted": marks.adaptation(), "machine": marks.machine()}
+    return {name: marks.classifier(name) for name in (OURS, "svm")} | besides
+
+
+def test_marks_tell_sizes_classifiers_and_questions_apart() -> None:
+    marks = [*marks_of("full").values(), *marks_of("quick").values()]
+    assert len(set(marks)) == len(marks)
+
+
+@pytest.mark.parametrize(
+    ("changed", "to"),
+    [
+        ("training.evaluation.judging.DISTORTED", 100),
+        ("training.evaluation.judging.MOMENTS", {"1.0 s": 1.2, WHOLE: None}),
+        ("training.scores.CALIBRATION_BINS", 10),
+    ],
+)
+def test_another_question_makes_what_every_classifier_answered_stale(
+    changed: str, to: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = marks_of()
+    monkeypatch.setattr(changed, to)
+    after = marks_of()
+    stale = {name for name in before if before[name] != after[name]}
+    assert stale == set(before) - {"machine"}
+
+
+@pytest.mark.parametrize(
+    ("file", "stale"),
+    [
+        ("training/evaluation/rejection.py", {OURS, "hover", "adapted"}),
+        ("training/evaluation/judging.py", {"hover", "adapted"}),
+        ("training/evaluation/unusual.py", {"adapted"}),
+        ("training/evaluation/hover.py", {"hover"}),
+        ("training/svm.py", {"svm", "machine"}),
+    ],
+)
+def test_another_source_file_makes_stale_what_follows_from_it(
+    file: str, stale: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = marks_of()
+    read = Path.read_text
+
+    def edited(path: Path) -> str:
+        return read(path) + ("MORE = 1\n" if path == ROOT / file else "")
+
+    monkeypatch.setattr(Path, "read_text", edited)
+    after = marks_of()
+    assert {name for name in before if before[name] != after[name]} == stale
 
 
 class Asked:
@@ -237,7 +286,3 @@ def test_what_cannot_be_is_refused_in_one_line(
         code = leaving.code
     assert code == 2
     assert complaint in capsys.readouterr().err
-
-
-def test_all_classifiers_are_asked_by_default() -> None:
-    assert Order(Path()).models == CONTENDERS
