@@ -11,6 +11,7 @@ from common.clock import NS_PER_S
 from common.topics import TOPICS
 from services.sim import plants, sensors
 from services.sim.body import CALM, BodyState, Quaternion, Vector3
+from services.sim.build import Build
 from services.sim.cameras import Figure, Shot, cameras_of
 from services.sim.config import Config
 from services.sim.delay import Delay
@@ -41,26 +42,22 @@ class Step(msgspec.Struct, frozen=True, gc=False):
 class _Shutter:
     """When a camera takes pictures: `fps` a second, the first after `phase` of a period."""
 
-    def __init__(self, topic: str, fps: float, phase: float) -> None:
+    def __init__(self, index: int, topic: str, fps: float, phase: float) -> None:
+        self.index = index
         self.topic = topic
         self._period_steps = PHYSICS_HZ / fps
         self._phase = phase
-        self._taken = 0
+        self.taken = 0
         self.next_step = self._at()
 
     def released(self) -> None:
         """The picture of `next_step` is taken."""
-        self._taken += 1
+        self.taken += 1
         self.next_step = self._at()
-
-    def skip_to(self, step: int) -> None:
-        """No picture was to be taken until now."""
-        while self.next_step <= step:
-            self.released()
 
     def _at(self) -> float:
         # Rounded, so that a picture meant for a step does not miss it by a last bit.
-        return round((self._taken + 1 - self._phase) * self._period_steps, 9)
+        return round((self.taken + 1 - self._phase) * self._period_steps, 9)
 
 
 def _every(topic: str) -> int:
@@ -79,12 +76,12 @@ _WIND_EVERY = round(WIND_STEP_S * PHYSICS_HZ)
 _NO_ONE: tuple[Figure, ...] = ()
 
 
-def _shutters_of(config: Config) -> list[_Shutter]:
+def _shutters_of(config: Config, build: Build) -> list[_Shutter]:
     # Half a period apart, so that the two cameras do not ask for the renderer at once.
     return [
-        _Shutter(camera.topic, camera.fps, phase)
-        for camera, phase in zip(cameras_of(config), (0.0, 0.5), strict=True)
-        if config.renderer != "none"
+        _Shutter(index, camera.topic, camera.fps, 0.5 * index)
+        for index, camera in enumerate(cameras_of(config))
+        if config.renderer != "none" and camera.topic in build.sensors
     ]
 
 
@@ -116,7 +113,6 @@ class Actor:
         self.plant_name = plant
         self.plant = plants.load(plant)
         self.others: Sequence[Actor] = ()
-        self._all_shutters = _shutters_of(config)
 
     @property
     def now_ns(self) -> int:
@@ -198,6 +194,8 @@ class Actor:
     def restart(self) -> None:
         """Start anew at its place, everything but the stamps."""
         config = self._config
+        # All rates begin anew, so that a seed is the same flight whenever it begins.
+        self._start_ns, self._count = self.now_ns, 0
         # The first vehicle's noise is that of the seed alone, however many there are.
         command, imu, altimeter, gusts = (
             np.random.default_rng(child)
@@ -206,9 +204,7 @@ class Actor:
         build = self.plant.build
         self.hull.place(self.position_m, self.yaw_rad)
         self._has_imu, self._has_altimeter = "imu" in build.sensors, "altimeter" in build.sensors
-        self._shutters = [each for each in self._all_shutters if each.topic in build.sensors]
-        for shutter in self._shutters:
-            shutter.skip_to(self._count)
+        self._shutters = _shutters_of(config, build)
         self._imu = sensors.Imu(imu, config.sensor_noise, STEP_S)
         self._altimeter = sensors.Altimeter(altimeter, config.sensor_noise)
         self._wind = (
@@ -253,6 +249,7 @@ class Actor:
         """The picture that fell into the last step."""
         was, now, share = self._was, self.state, shutter.next_step - (self._count - 1)
         stamp_ns = self._start_ns + int(shutter.next_step * STEP_NS)
+        seed = (self._seed, self.index, shutter.index, shutter.taken)
         shutter.released()
         # Within a step the body moves on at a constant velocity.
         (x0, y0, z0), (x1, y1, z1) = was.position_m, now.position_m
@@ -268,6 +265,7 @@ class Actor:
             now.angular_velocity_radps,
             self.index,
             tuple(other.figure() for other in self.others) if self.others else _NO_ONE,
+            seed,
         )
 
 

@@ -27,8 +27,6 @@ _MEASURED = Lens(640, 360, (569.9, 568.0, 331.4, 135.9), (-0.527, 0.274, 0.0, 0.
 """A real AR.Drone's front camera as ardrone_autonomy ships its calibration."""
 _DOWN = Lens.of_view(320, 240, math.radians(53.13))
 """About 64 deg along the diagonal, as the AR.Drone's."""
-_NEXT_SEED = 1_000_003
-"""From the seed of one vehicle's pictures to the next one's."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,6 @@ class Camera:
         near_m: it sees nothing nearer; the nearer, the less it tells far things apart.
         exposure_s: how long the shutter is open: what moves meanwhile is smeared.
         noise: scale of a picture's noise.
-        seed: of that noise.
         vehicle: whose it is, 0 for the first.
     """
 
@@ -54,7 +51,6 @@ class Camera:
     near_m: float = 0.08
     exposure_s: float = 0.0
     noise: float = 0.0
-    seed: int = 0
     vehicle: int = 0
 
 
@@ -90,6 +86,7 @@ class Shot:
         angular_velocity_radps: world.
         vehicle: whose camera, 0 for the first.
         others: the other vehicles, where the step left them in which the picture falls.
+        seed: of its noise.
     """
 
     topic: str
@@ -100,12 +97,12 @@ class Shot:
     angular_velocity_radps: Vector3 = (0.0, 0.0, 0.0)
     vehicle: int = 0
     others: tuple[Figure, ...] = ()
+    seed: tuple[int, ...] = (0,)
 
 
 def cameras_of(config: Config, vehicle: int = 0, build: Build = ARDRONE) -> tuple[Camera, Camera]:
     """A vehicle's cameras, front and down."""
-    seed = config.seed + _NEXT_SEED * vehicle
-    eyes = (config.exposure_s, config.picture_noise, seed, vehicle)
+    eyes = (config.exposure_s, config.picture_noise, vehicle)
     return (
         Camera("camera/front", front_lens(config), build.front, config.front_fps, 0.08, *eyes),
         # On the ground it is 25 mm above it.

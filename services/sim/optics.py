@@ -112,7 +112,7 @@ def noisy(picture: Picture, camera: Camera, shot: Shot) -> Picture:
     scale = camera.noise
     if scale == 0.0:
         return picture
-    generator = np.random.default_rng([camera.seed, shot.stamp_ns])
+    generator = np.random.default_rng(shot.seed)
     gain = 1.0 + scale * GAIN_NOISE * generator.standard_normal()
     height, width = picture.shape[:2]
     # One tile, begun anywhere and repeated: drawing a million numbers a picture takes 10 ms.

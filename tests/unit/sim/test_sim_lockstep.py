@@ -7,7 +7,7 @@ from flights import command
 
 from common.clock import ManualClock
 from common.memory_bus import MemoryBus, MemoryNetwork
-from common.messages import Pose, ResetRequest, decode, encode
+from common.messages import Image, Pose, ResetRequest, decode, encode
 from common.node import Node
 from common.topics import key_of
 from services.sim.body import Sticks
@@ -72,6 +72,37 @@ def test_a_reset_is_granted_while_it_waits() -> None:
         handler = next(s.handler for s in node._servers if s.query.name == "sim/reset")
         assert handler(request, 0).world == "empty"
         assert heard["truth"] == []
+
+
+def test_pictures_noise_is_that_of_the_seed_which_a_reset_gives() -> None:
+    config = Config(clock="lockstep", picture_noise=1.0, seed=4, wind_mps=3.0, exposure_s=0.01)
+    with stage(config) as (node, _, heard):
+        ask = MemoryBus(node.bus._network)  # type: ignore[attr-defined]
+        orders = ask.publication(key_of("unit", "command"), None, "")  # type: ignore[arg-type]
+        reset = next(s.handler for s in node._servers if s.query.name == "sim/reset")
+
+        def pictures(commands: int) -> list[bytes]:
+            for topic in ("camera/front", "camera/down"):
+                heard[topic].clear()
+            for _ in range(commands):
+                orders.put(encode(command(Sticks(vx=0.3))))
+                node.spin()
+            return [
+                decode(payload, Image).data
+                for topic in ("camera/front", "camera/down")
+                for payload in heard[topic]
+            ]
+
+        flights = []
+        for seed, commands in ((9, 7), (9, 5), (8, 5)):
+            # Flown for another while before, its pictures are those of its seed all the same.
+            reset(ResetRequest(position=(0.0, 0.0, 1.0), seed=seed), 0)
+            flights.append(pictures(commands))
+        first, again, other = flights
+        assert len(first) > len(again) == len(other) == 9
+        reset(ResetRequest(position=(0.0, 0.0, 1.0), seed=9), 0)
+        assert pictures(7) == first
+        assert not set(first) & set(other)
 
 
 def test_with_several_vehicles_physics_waits_for_the_command_of_each() -> None:

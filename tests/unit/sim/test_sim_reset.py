@@ -2,8 +2,9 @@
 
 import pytest
 from flights import fly, hovering
+from msgspec.structs import replace
 
-from common.messages import ResetRequest
+from common.messages import ResetRequest, encode
 from services.sim.body import Sticks
 from services.sim.config import Config
 from services.sim.core import ResetError, Simulation
@@ -24,6 +25,26 @@ def test_what_is_left_out_stays_as_it_was_set() -> None:
     assert status.state == "flying"
     assert simulation.state.position_m == pytest.approx((2.0, 1.0, 1.5))
     assert simulation.state.yaw_rad == pytest.approx(0.5)
+
+
+def test_a_seed_is_the_same_flight_again_whenever_it_begins() -> None:
+    config = Config(world="track", plant="ardrone", wind_mps=4.0, renderer="none")
+    simulation = Simulation(config)
+
+    def flight(seed: int) -> list[tuple[str, bytes]]:
+        simulation.reset(ResetRequest(position=(1.0, 0.0, 1.0), seed=seed))
+        begin_ns = simulation.now_ns
+        _, messages = fly(simulation, 1.0, Sticks(vx=0.3, wz=0.2))
+        return [
+            (topic, encode(replace(message, stamp=message.stamp - begin_ns)))
+            for topic, message in messages
+        ]
+
+    first = flight(5)
+    fly(simulation, 0.137)
+    assert flight(5) == first
+    assert flight(6) != first
+    simulation.close()
 
 
 @pytest.mark.parametrize(
