@@ -19,7 +19,7 @@ class Config:
     """Where it starts: one of `autocomplete worlds`, or the path of a YAML file like those."""
     plant: str = "tum"
     """What the vehicle is: tum, ardrone, rover, or a file of your own in services/sim/plants."""
-    vehicles: str = "1"
+    vehicles: int | str = 1
     """How many share the world; or a plant for each, as tum,ardrone,rover; NAME=PLANT names it."""
     seed: int = 0
     """Of all noise; the same seed and commands give the same flight."""

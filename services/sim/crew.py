@@ -18,22 +18,23 @@ class Member:
     name: str | None = None
 
 
-def crew_of(text: str, plant: str) -> tuple[Member, ...]:
-    """The vehicles that a text stands for.
+def crew_of(vehicles: int | str, plant: str) -> tuple[Member, ...]:
+    """The vehicles that a number or a text stands for.
 
     Args:
-        text: how many, or a plant for each, separated by commas; NAME=PLANT names it.
-        plant: what they are if the text is a number.
+        vehicles: how many, or a plant for each, separated by commas; NAME=PLANT names it.
+        plant: what they are if it is a number.
 
     Raises:
         ValueError: if it stands for none; the text says what is allowed.
     """
-    if text.isdecimal():
-        members = (Member(plant),) * min(int(text), MOST + 1)
+    text = str(vehicles).strip()
+    if text.removeprefix("-").isdecimal():
+        members = (Member(plant),) * max(0, min(int(text), MOST + 1))
     else:
         members = tuple(_member(word.strip()) for word in text.split(","))
     if not 1 <= len(members) <= MOST:
-        raise ValueError(f"1 to {MOST} vehicles, not {text!r}")
+        raise ValueError(f"1 to {MOST} vehicles, not {text}")
     return members
 
 

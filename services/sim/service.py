@@ -5,7 +5,6 @@ from functools import partial
 
 from common import messages as m
 from common.clock import seconds
-from common.config import ConfigError
 from common.node import Node, RefusedError
 from services.sim.cameras import VIDEO_TOPICS, Camera, Shot, cameras_of
 from services.sim.config import Config
@@ -30,12 +29,12 @@ def check(config: Config, vehicle: str) -> None:
     """See whether the vehicles can have the names that are asked for.
 
     Raises:
-        ConfigError: if they cannot.
+        ValueError: if they cannot, which is wrong usage.
     """
     try:
         names_of(crew_of(config.vehicles, config.plant), vehicle)
     except ValueError as error:
-        raise ConfigError(f"vehicles: {error}") from None
+        raise ValueError(f"vehicles: {error}") from None
 
 
 def wire(node: Node, config: Config) -> None:

@@ -2,7 +2,9 @@
 
 import itertools
 import math
+import threading
 from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -10,6 +12,9 @@ import pytest
 from flights import command
 
 import worlds
+from cli.main import main
+from common import log, run
+from common.config import ConfigError, load
 from common.messages import Command, Message, ResetRequest, encode
 from services.sim.body import Sticks
 from services.sim.cameras import Shot, cameras_of
@@ -22,7 +27,7 @@ from services.sim.studio import open_renderer
 Messages = list[tuple[str, Message]]
 
 
-def run(
+def fly_all(
     simulation: Simulation, duration_s: float, *orders: Command | None
 ) -> tuple[list[Messages], list[list[Shot]]]:
     """Messages and shots of each vehicle, which hears its order 50 times a second."""
@@ -48,8 +53,8 @@ def test_others_do_not_change_the_first_ones_flight_by_a_bit(plant: str) -> None
             Config(world="empty", plant=plant, vehicles=vehicles, seed=7, wind_mps=3.0)
         )
         others = [command(Sticks(vy=1.0), "takeoff")] * (len(simulation.actors) - 1)
-        said, _ = run(simulation, 1.0, command(Sticks(), "takeoff"), *others)
-        more, _ = run(simulation, 1.0, command(Sticks(vx=0.5)), *[None] * len(others))
+        said, _ = fly_all(simulation, 1.0, command(Sticks(), "takeoff"), *others)
+        more, _ = fly_all(simulation, 1.0, command(Sticks(vx=0.5)), *[None] * len(others))
         heard.append(raw(said[0] + more[0]))
         simulation.close()
     assert heard[0] == heard[1]
@@ -59,7 +64,7 @@ def test_each_has_noise_of_its_own_and_a_seed_is_the_same_flight_again() -> None
     flights = []
     for _ in range(2):
         simulation = Simulation(Config(world="empty", vehicles="3", seed=2))
-        flights.append([raw(said) for said in run(simulation, 0.5, None, None, None)[0]])
+        flights.append([raw(said) for said in fly_all(simulation, 0.5, None, None, None)[0]])
         simulation.close()
     assert flights[0] == flights[1]
     imus = [[data for topic, data in said if topic == "imu"] for said in flights[0]]
@@ -74,7 +79,7 @@ def test_they_start_apart_from_one_another_and_from_all_that_stands_there(name: 
     assert places[0][:2] == pytest.approx(start.start_position_m[:2])
     assert all(math.dist(a, b) > 0.9 * APART_M for a, b in itertools.combinations(places, 2))
     assert not any(actor.hull.overlaps() for actor in simulation.actors)
-    run(simulation, 0.5, *[None] * 5)
+    fly_all(simulation, 0.5, *[None] * 5)
     assert [actor.status().collisions for actor in simulation.actors] == [0] * 5
     simulation.close()
 
@@ -82,8 +87,8 @@ def test_they_start_apart_from_one_another_and_from_all_that_stands_there(name: 
 def test_a_command_moves_only_whom_it_was_meant_for() -> None:
     simulation = Simulation(Config(world="empty", vehicles="3", command_noise=0.0))
     takeoff = command(action="takeoff")
-    run(simulation, 2.0, None, takeoff, None)
-    run(simulation, 1.0, None, command(Sticks(vx=1.0)), None)
+    fly_all(simulation, 2.0, None, takeoff, None)
+    fly_all(simulation, 1.0, None, command(Sticks(vx=1.0)), None)
     states = [actor.status().state for actor in simulation.actors]
     assert states == ["landed", "flying", "landed"]
     speeds = [actor.state.velocity_mps[0] for actor in simulation.actors]
@@ -98,12 +103,12 @@ def test_they_collide(rammed: str) -> None:
     simulation.reset(ResetRequest(position=(-1.0, 0.0, max(height_m, 0.2))), 0)
     simulation.reset(ResetRequest(position=(0.5, 0.0, height_m)), 1)
     if rammed == "rover":
-        run(simulation, 0.1, command(action="takeoff"), None)
+        fly_all(simulation, 0.1, command(action="takeoff"), None)
     ahead = command(Sticks(vx=1.0))
     before_m = simulation.actors[1].state.position_m[0]
     seen = []
     for _ in range(30):
-        said, _ = run(simulation, 0.1, ahead, command(Sticks()))
+        said, _ = fly_all(simulation, 0.1, ahead, command(Sticks()))
         seen += [message.collisions for topic, message in said[1] if topic == "vehicle"]  # type: ignore[attr-defined]
     assert all(actor.status().collisions >= 1 for actor in simulation.actors)
     assert max(seen) >= 1
@@ -114,7 +119,7 @@ def test_they_collide(rammed: str) -> None:
 
 def test_a_reset_is_of_one_vehicle_and_another_world_of_all() -> None:
     simulation = Simulation(Config(world="empty", vehicles="tum,tum,rover"))
-    run(simulation, 1.0, *[command(Sticks(vx=0.5), "takeoff")] * 3)
+    fly_all(simulation, 1.0, *[command(Sticks(vx=0.5), "takeoff")] * 3)
     before = [actor.state for actor in simulation.actors]
     status = simulation.reset(ResetRequest(position=(5.0, 5.0, 1.0), seed=4), 1)
     assert (status.state, status.battery) == ("flying", 1.0)
@@ -133,11 +138,11 @@ def test_a_reset_makes_another_vehicle_of_one_or_changes_nothing() -> None:
     simulation = Simulation(Config(world="track", vehicles="2"))
     with pytest.raises(ResetError, match="free"):
         simulation.reset(ResetRequest(plant="rover", position=(4.5, 4.2, 0.5)), 1)
-    run(simulation, 0.2, None, None)
+    fly_all(simulation, 0.2, None, None)
     assert simulation.actors[1].status().plant == "tum"
     status = simulation.reset(ResetRequest(plant="rover"), 1)
     assert (status.plant, status.state) == ("rover", "flying")
-    run(simulation, 1.0, None, command(Sticks(vx=1.0)))
+    fly_all(simulation, 1.0, None, command(Sticks(vx=1.0)))
     assert simulation.actors[1].state.velocity_mps[0] == pytest.approx(1.0, abs=0.02)
     assert simulation.actors[0].status().state == "landed"
     simulation.close()
@@ -145,7 +150,7 @@ def test_a_reset_makes_another_vehicle_of_one_or_changes_nothing() -> None:
 
 def test_a_camera_sees_the_others_and_not_its_own_vehicle() -> None:
     simulation = Simulation(Config(world="empty", vehicles="tum,rover,ardrone"))
-    _, taken = run(simulation, 0.1, None, None, None)
+    _, taken = fly_all(simulation, 0.1, None, None, None)
     for index, shots in enumerate(taken):
         assert {shot.topic for shot in shots} == {"camera/front", "camera/down"}
         assert {shot.vehicle for shot in shots} == {index}
@@ -162,7 +167,7 @@ def test_another_vehicle_is_in_the_picture_where_it_is(choice: Literal["gl", "ti
     simulation = Simulation(config)
     simulation.reset(ResetRequest(position=(0.0, 0.0, 2.0)), 0)
     simulation.reset(ResetRequest(position=(2.21, 0.5, 2.0)), 1)
-    (shot,) = [s for s in run(simulation, 0.034, None, None)[1][0] if s.topic == "camera/front"]
+    (shot,) = [s for s in fly_all(simulation, 0.034, None, None)[1][0] if s.topic == "camera/front"]
     try:
         renderer = open_renderer(choice)
     except NoOpenGlError:
@@ -203,24 +208,40 @@ def test_names_count_on_from_the_first_unless_they_are_given(
 
 
 @pytest.mark.parametrize(
-    ("text", "named"),
+    ("text", "said"),
     [
-        ("0", "1 to 16"),
-        ("17", "1 to 16"),
-        ("", "plants are"),
-        ("tum,zeppelin", "zeppelin"),
-        ("tum,Big Ben=tum", "Big Ben"),
-        ("-1", "-1"),
+        ("0", "1 to 16 vehicles, not 0"),
+        ("-1", "1 to 16 vehicles, not -1"),
+        ("17", "1 to 16 vehicles, not 17"),
+        ("", "plants are ardrone, rover, tum"),
+        ("a,a", "'a' is no vehicle"),
+        ("tum,,tum", "plants are ardrone, rover, tum"),
+        ("tum=..", "NAME=PLANT"),
+        ("x=nope", "plants are ardrone, rover, tum"),
+        ("tum,Big Ben=tum", "'Big Ben' names no vehicle; use 1 to 32 of a-z 0-9 _ -"),
+        ("tum,a=tum,a=rover", "two are named 'a'"),
+        ("tum,drone0=tum", "two are named 'drone0'"),
+        ("b=tum,rover", "--vehicle b"),
     ],
 )
-def test_what_is_no_number_or_list_of_vehicles_is_refused(text: str, named: str) -> None:
-    with pytest.raises(ValueError, match=f"vehicles: .*{named}"):
-        Config(vehicles=text)
+def test_wrong_vehicles_are_wrong_usage_in_one_line_that_says_what_is_allowed(
+    text: str, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(run, "stop_on_signals", threading.Event)
+    monkeypatch.setattr(log, "configure", lambda *_: None)
+    assert main(["run", "sim", "--vehicles", text]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "vehicles: " in line
+    assert said in line
 
 
-@pytest.mark.parametrize(
-    ("text", "named"), [("tum,a=tum,a=rover", "'a'"), ("b=tum,rover", "--vehicle b")]
-)
-def test_names_that_clash_are_refused(text: str, named: str) -> None:
-    with pytest.raises(ValueError, match=named):
-        names_of(crew_of(text, "tum"), "drone0")
+def test_a_file_may_say_how_many_as_a_number(tmp_path: Path) -> None:
+    file = tmp_path / "system.toml"
+    for text, names in (("3", ["drone0", "drone1", "drone2"]), ("'tum,a=rover'", ["drone0", "a"])):
+        file.write_text(f"[sim]\nvehicles = {text}\n")
+        config = load(Config, "sim", file, {})
+        assert list(names_of(crew_of(config.vehicles, config.plant), "drone0")) == names
+    for text in ("0", "true", "2.5", "['tum', 'rover']"):
+        file.write_text(f"[sim]\nvehicles = {text}\n")
+        with pytest.raises(ConfigError, match=r"system\.toml sets 'vehicles'"):
+            load(Config, "sim", file, {})
