@@ -32,10 +32,9 @@ def declare(parser: argparse.ArgumentParser) -> None:
     job.add_argument(
         "--preset",
         choices=PRESETS,
-        default="shipped",
-        help="how much to train on: shipped (about 12 minutes) or quick (under one minute)",
+        help="how much to train on: shipped (about 12 minutes, the default) or quick (under one)",
     )
-    parser.add_argument("--seed", type=opts.seed, default=0, help="same seed, same model (0)")
+    parser.add_argument("--seed", type=opts.seed, help="same seed, same model (0)")
     parser.add_argument(
         "--out",
         metavar="FOLDER",
@@ -46,7 +45,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--resume",
         action="store_true",
-        help="go on with a run of the same preset, seed and folder that was stopped",
+        help="go on with a run of the same preset, seed, people and folder that was stopped",
     )
     job.add_argument(
         "--finetune",
@@ -69,7 +68,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--ablation",
         metavar="FILE",
         type=Path,
-        help="compare variants of the network and write the page FILE",
+        help="compare variants of the network, with seeds of its own, and write the page FILE",
     )
     opts.add_examples(
         parser,
@@ -123,26 +122,30 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueError("--operator is whom --finetune adapts to; name a file with --finetune")
     if options.out is not None and options.ablation is not None:
         raise ValueError("--out is a model's folder; --ablation writes its page only")
+    if options.seed is not None and options.ablation is not None:
+        raise ValueError("--seed is of one model; --ablation has seeds of its own")
+    # Not argparse's defaults: what was said must be known, and it forgets what equals a default.
+    seed, preset = options.seed or 0, options.preset or "shipped"
     console = Console()
     with counted(console) as progress:
         bars = _Bars(progress)
         if options.finetune is not None:
-            return _finetune(console, options, bars)
+            return _finetune(console, options, seed, bars)
         if options.ablation is not None:
             return _ablation(console, options, bars)
         run = train(
-            options.preset,
-            options.seed,
-            options.out or Path("models/quick" if options.preset == "quick" else "models"),
+            preset,
+            seed,
+            options.out or Path("models/quick" if preset == "quick" else "models"),
             bars,
             resume=options.resume,
-            processes=1 if options.preset == "quick" else min(4, os.cpu_count() or 1),
+            processes=1 if preset == "quick" else min(4, os.cpu_count() or 1),
         )
     _report(console, run)
     return 0
 
 
-def _finetune(console: Console, options: argparse.Namespace, bars: _Bars) -> int:
+def _finetune(console: Console, options: argparse.Namespace, seed: int, bars: _Bars) -> int:
     from training.dataset.check import load_sound
     from training.finetune import finetune
 
@@ -151,7 +154,7 @@ def _finetune(console: Console, options: argparse.Namespace, bars: _Bars) -> int
         console.print(f"left out: {finding}")
     out = options.out or Path("models/finetuned")
     begin = options.model or Path("models/intent.onnx")
-    done = finetune(primitives, begin, out, options.seed, bars.generating, options.operator)
+    done = finetune(primitives, begin, out, seed, bars.generating, options.operator)
     console.print(
         f"{done.performances} performances by {done.operator}: F1 {done.before:.3f} before;"
         f" {done.after:.3f} after, on those left out of each of three adaptations"

@@ -1,5 +1,6 @@
 """From nothing to a model file: generate people, train, judge on others, export, write the card."""
 
+import hashlib
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -187,7 +188,7 @@ def train(
         seed: the same seed and machine give the same file.
         out: folder.
         progress: told how far it is.
-        resume: go on with a run of the same preset and seed that was stopped.
+        resume: go on with a run of the same preset, seed and people that was stopped.
         processes: that make the people side by side.
 
     Raises:
@@ -208,7 +209,8 @@ def train(
 
     training = people("training", preset.training, 0)
     validation = people("validation", preset.validation, 1)
-    name = f"{preset_name}, {preset.budget.windows} windows, seed {seed}"
+    learned = f"people {digest(training, validation)}"
+    name = f"{preset_name}, {preset.budget.windows} windows, seed {seed}, {learned}"
     run = Training(training, validation, seed, preset.budget, name=name)
     if resume:
         run.resume(checkpoint)
@@ -243,6 +245,16 @@ def train(
     (out / f"{MODEL_NAME}.json").write_text(json.dumps(figures(done), indent=1) + "\n")
     checkpoint.unlink()
     return done
+
+
+def digest(*sets: Examples) -> str:
+    """What sticks and labels come to, in 8 hex digits: people made by other code are others."""
+    told = hashlib.sha256()
+    for examples in sets:
+        told.update(examples.labels.tobytes())
+        for track in examples.tracks:
+            told.update(track.tobytes())
+    return told.hexdigest()[:8]
 
 
 def figures(run: Run) -> dict[str, object]:

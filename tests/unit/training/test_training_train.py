@@ -1,5 +1,7 @@
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -7,6 +9,7 @@ import torch
 from cli.main import main
 from services.classifier.model import OnnxModel
 from training import train as training
+from training.dataset.primitive import Primitive
 from training.fit import Budget, Epoch
 from training.labels import PRIMITIVES
 from training.people import Share, people_of
@@ -89,6 +92,24 @@ def test_the_same_seed_gives_the_same_file_stopped_and_resumed_or_not(tmp_path: 
     assert one.sha256 == other.sha256 == resumed.sha256 != different.sha256
 
 
+def test_a_run_goes_on_with_the_people_it_began_with_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        train("quick", 3, tmp_path, Stopped())
+
+    def softer(*arguments: Any) -> list[Primitive]:
+        return [replace(one, sticks=0.9 * one.sticks) for one in people_of(*arguments)]
+
+    monkeypatch.setattr(training, "people_of", softer)
+    resumed = ["train", "--preset", "quick", "--seed", "3", "--resume", "--out", str(tmp_path)]
+    assert main(resumed) == 1
+    error = capsys.readouterr().err
+    assert len(error.splitlines()) == 1
+    assert "seed 3, people " in error
+    assert "run without --resume to begin anew" in error
+
+
 def test_people_are_the_same_in_any_number_of_processes() -> None:
     share = Share(wide_people=30, wide=0.06, thesis_people=3, thesis=0.01)
     one, other = people_of("set", share, 5), people_of("set", share, 5, processes=2)
@@ -129,6 +150,33 @@ def test_the_command_prints_the_table(tmp_path: Path, capsys: pytest.CaptureFixt
     for word in ("calibrated", "wide", "1.5 s", "AUROC", "helix"):
         assert word in printed
     assert (tmp_path / "intent.onnx").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["--finetune", "ana.npz", "--preset", "quick"], "--preset"),
+        (["--finetune", "ana.npz", "--ablation", "page.md"], "--ablation"),
+        (["--finetune", "ana.npz", "--resume"], "--resume goes on with a training"),
+        (["--ablation", "page.md", "--preset", "shipped"], "--preset"),
+        (["--ablation", "page.md", "--resume"], "--resume goes on with a training"),
+        (["--ablation", "page.md", "--seed", "0"], "--ablation has seeds of its own"),
+        (["--ablation", "page.md", "--out", "models"], "--ablation writes its page only"),
+        (["--model", "intent.onnx"], "name a file with --finetune"),
+        (["--operator", "ana"], "name a file with --finetune"),
+    ],
+)
+def test_what_would_be_ignored_is_refused(
+    arguments: list[str], reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        code: object = main(["train", *arguments])
+    except SystemExit as left:
+        code = left.code
+    error = capsys.readouterr().err
+    assert code == 2
+    assert len(error.splitlines()) == 1
+    assert reason in error
 
 
 @pytest.mark.parametrize(
