@@ -73,7 +73,8 @@ class Config:
         except ValueError as error:
             raise ValueError(f"plant: {error}") from None
         try:
-            crew_of(self.vehicles, self.plant)
+            for member in crew_of(self.vehicles, self.plant):
+                plants.load(member.plant)
         except ValueError as error:
             raise ValueError(f"vehicles: {error}") from None
         if self.seed < 0:

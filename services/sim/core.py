@@ -133,7 +133,7 @@ class Simulation:
         try:
             build = plants.load(plant).build
         except ValueError as error:
-            raise ResetError("plant", f"no plant {error}") from None
+            raise ResetError("plant", str(error)) from None
         if request.position is not None:
             _check(request.position)
         if request.world is None or request.world == self._world.name:
