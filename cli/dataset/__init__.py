@@ -28,6 +28,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Add the subcommands with their options."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EXPLANATION
+    parser.set_defaults(words=getattr(parser, "words", ()))
     commands = parser.add_subparsers(dest="subcommand", metavar="COMMAND", required=True)
     for name, (module, text) in COMMANDS.items():
         command = commands.add_parser(name, help=text, description=text)

@@ -75,7 +75,7 @@ def _run(options: argparse.Namespace) -> int:
     primitives = [replace(one, operator=f"{begin}-{one.operator}") for one in primitives]
     made = (
         f"generate --preset {options.preset} --operators {options.operators}"
-        f" --multiple {options.multiple:g} --none {options.none} --seed {options.seed}"
+        f" --multiple {options.multiple!r} --none {options.none} --seed {options.seed}"
     )
     save(options.out, primitives, {"made": made})
     print(f"{options.out}: {len(primitives)} primitives by {options.operators} operators")

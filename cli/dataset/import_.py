@@ -1,7 +1,6 @@
 """`autocomplete dataset import`: files of sticks into one set."""
 
 import argparse
-import shlex
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -211,7 +210,7 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueError("--ignored-is-none goes with --from-flights")
     rules = _rules(options)
     primitives: list[Primitive] = []
-    provenance = {}
+    provenance: dict[str, str] = {}
     if options.out.exists():
         if not options.append:
             raise OSError(f"{options.out} is there already; choose another --out, or --append")
@@ -249,8 +248,6 @@ def _run(options: argparse.Namespace) -> int:
     console.print(table)
     if not taken:
         raise OSError("nothing of these files can be used, so nothing was written")
-    command = shlex.join(["import", *(str(path) for path in options.files)])
-    made = "; ".join(filter(None, [provenance.get("made", ""), command]))
-    save(options.out, primitives, {**provenance, "made": made})
+    save(options.out, primitives, shared.made(provenance, options))
     print(f"{options.out}: {len(primitives)} primitives")
     return 0

@@ -65,18 +65,18 @@ class _Set:
         OSError: if it is there and is no set.
     """
 
-    def __init__(self, path: Path, label: str) -> None:
+    def __init__(self, options: argparse.Namespace) -> None:
         from training.dataset.store import open_set
 
-        self.path = path
+        self.path = options.out or Path("recordings") / f"{options.operator}.npz"
         self.taken = 0
-        self._label = label
+        self._label = options.label
         self._primitives: list[Primitive] = []
-        self._provenance: dict[str, str] = {"made": "record"}
-        if path.exists():
-            stored = open_set(path)
-            self._primitives = stored.primitives()
-            self._provenance = stored.provenance
+        before: dict[str, str] = {}
+        if self.path.exists():
+            stored = open_set(self.path)
+            self._primitives, before = stored.primitives(), stored.provenance
+        self._provenance = shared.made(before, options)
 
     def take(self, event: "Event") -> str:
         """Do what a press of the button asks for; what to tell the person."""
@@ -113,7 +113,7 @@ class _Set:
 def _run(options: argparse.Namespace) -> int:
     with shared.training_installed():
         from training.dataset.collection import Collection
-    collected = _Set(options.out or Path("recordings") / f"{options.operator}.npz", options.label)
+    collected = _Set(options)
     collection = Collection(
         options.label, options.operator, options.family, f"record {options.vehicle}"
     )

@@ -2,8 +2,9 @@
 
 import argparse
 import contextlib
+import shlex
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 PROBLEMS_SHOWN = 20
@@ -56,6 +57,14 @@ def add_people(parser: argparse.ArgumentParser, operator_help: str, *, required:
     parser.add_argument(
         "--family", metavar="NAME", default="", help="what kind of person that is (none)"
     )
+
+
+def made(before: Mapping[str, str], options: argparse.Namespace) -> dict[str, str]:
+    """A set's provenance after this command, which is told with all its options."""
+    told, command = before.get("made", ""), shlex.join(options.words)
+    if f"; {told}".endswith(f"; {command}"):
+        return dict(before)
+    return {**before, "made": f"{told}; {command}" if told else command}
 
 
 def tell(problems: Sequence[object]) -> None:

@@ -24,11 +24,10 @@ def _run(options: argparse.Namespace) -> int:
         from training.dataset.store import open_set, save
     stored = open_set(options.file)
     split = split_by_operator(stored.primitives(), options.seed)
-    before = stored.provenance.get("made", "")
-    made = "; ".join(filter(None, [before, f"split {options.file} --seed {options.seed}"]))
+    provenance = shared.made(stored.provenance, options)
     for name, part in vars(split).items():
         path = options.file.with_suffix(f".{name}.npz")
-        save(path, part, {**stored.provenance, "made": made})
+        save(path, part, provenance)
         operators = len({p.operator for p in part})
         print(f"{path}: {len(part)} primitives by {operators} operators")
     return 0

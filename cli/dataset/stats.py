@@ -38,9 +38,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     with shared.training_installed():
-        from training.dataset.store import load
+        from training.dataset.store import open_set
         from training.dataset.summary import by_class, group_of, grouped
-    primitives = [primitive for path in options.files for primitive in load(path)]
+    stored = [open_set(path) for path in options.files]
+    primitives = [primitive for one in stored for primitive in one.primitives()]
     if not primitives:
         raise OSError("there is nothing in it; add primitives with 'autocomplete dataset record'")
     console = Console()
@@ -48,6 +49,9 @@ def _run(options: argparse.Namespace) -> int:
     console.print(_lengths([*by_class(primitives), total]))
     console.print(_counts("family", grouped(primitives, lambda p: p.family or "unknown")))
     console.print(_counts("operator", grouped(primitives, lambda p: p.operator)))
+    for one in stored:
+        told = ", ".join(f"{name}: {text}" for name, text in sorted(one.provenance.items()))
+        console.print(f"{one.path}: {told}", highlight=False, soft_wrap=True)
     if options.figure is not None:
         with shared.training_installed():
             from training.dataset.figures import draw_lengths

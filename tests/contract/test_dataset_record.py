@@ -87,7 +87,7 @@ def hands(client: Client, operator: None) -> Hands:
 
 def labels_in(path: Path) -> list[str]:
     with np.load(path) as file:
-        assert json.loads(str(file["provenance"]))["made"] == "record"
+        assert json.loads(str(file["provenance"]))["made"].startswith("record --label ")
         return file["label"].tolist() if "label" in file else []
 
 

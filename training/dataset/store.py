@@ -90,7 +90,7 @@ def save(
     Args:
         path: where to.
         primitives: what.
-        provenance: who made them from what; the program's version is added.
+        provenance: who made them from what; the version of this program is added.
 
     Raises:
         OSError: if it cannot be written.
@@ -106,7 +106,7 @@ def save(
         "rate_hz": np.array([p.rate_hz for p in primitives], dtype=np.float32),
         "utc_ns": np.array([p.utc_ns for p in primitives], dtype=np.int64),
         "provenance": np.array(
-            json.dumps({"program": f"autocomplete {VERSION}"} | dict(provenance or {}))
+            json.dumps(dict(provenance or {}) | {"program": f"autocomplete {VERSION}"})
         ),
     }
     for word in WORDS:

@@ -41,7 +41,22 @@ def test_import_replaces_no_set_but_adds_to_one(
     assert "is there already; choose another --out, or --append" in capsys.readouterr().err
     assert dataset("import", path, "--out", out, "--append", "--operator", "ben") == 0
     assert [p.operator for p in load(out)] == ["ana", "ben"]
-    assert open_set(out).provenance["made"] == f"import {path}; import {path}"
+    assert open_set(out).provenance["made"] == (
+        f"import {path} --out {out}; import {path} --out {out} --append --operator ben"
+    )
+
+
+def test_a_set_says_with_which_options_it_was_made(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_csv(tmp_path / "a.csv", performed((circle(), "circle")))
+    out = tmp_path / "set.npz"
+    options = ("--label", "sine", "--axes", "vx,vy,vz", "--segmentation", "ours", "--idle", "0.5")
+    assert dataset("import", path, "--out", out, *options) == 0
+    assert dataset("stats", out) == 0
+    assert f"made: import {path} --out {out} {' '.join(options)}, program: " in (
+        capsys.readouterr().out
+    )
 
 
 def test_the_preset_of_the_thesis_pads_to_200(tmp_path: Path) -> None:
