@@ -5,6 +5,7 @@ threads. The network's callbacks only put payloads in boxes. A stream's box hold
 only, so nothing queues; an event's box keeps order.
 """
 
+import contextlib
 import logging
 import threading
 from collections import deque
@@ -48,6 +49,7 @@ class _Subscription:
     topic: Topic
     handler: Handler
     box: deque[tuple[bytes, int]]
+    ages: bool
     received: int = 0
     rejected: int = 0
 
@@ -90,8 +92,9 @@ class Node:
         self._closers: list[Callable[[], None]] = []
         self._besides: list[Node] = []
         self._waiting: Node = self
-        self._wake = threading.Condition()
-        self._woken = False
+        # Held while there is nothing to do: half of what a condition costs at each message.
+        self._idle = threading.Lock()
+        self._idle.acquire()
         self._latencies_s: deque[float] = deque(maxlen=LATENCY_SAMPLES)
         self._warn = RateLimited(log, self.clock)
         self._health_of_core: Callable[[], tuple[m.HealthState, str]] = lambda: ("ok", "")
@@ -109,7 +112,13 @@ class Node:
     # --- what a service declares -----------------------------------------------------------------
 
     def on(
-        self, topic_name: str, handler: Handler, *, depth: int | None = None, timed: bool = False
+        self,
+        topic_name: str,
+        handler: Handler,
+        *,
+        depth: int | None = None,
+        timed: bool = False,
+        ages: bool = True,
     ) -> None:
         """Have `handler(message, arrival_ns)` called with what arrives on a topic.
 
@@ -119,11 +128,13 @@ class Node:
             depth: how many payloads wait at most; by default 1 for streams and commands (the newest
                 wins) and EVENT_DEPTH for events.
             timed: whether this is the service's main step, whose duration `health` reports.
+            ages: whether a command that has waited beyond its age is dropped.
         """
         topic = TOPICS[topic_name]
         if depth is None:
             depth = EVENT_DEPTH if topic.delivery is Delivery.EVENT else 1
-        subscription = _Subscription(topic, self._timed(handler) if timed else handler, deque())
+        handler = self._timed(handler) if timed else handler
+        subscription = _Subscription(topic, handler, deque(), ages)
         subscription.box = deque(maxlen=depth)
         self._subscriptions[topic_name] = subscription
 
@@ -221,10 +232,7 @@ class Node:
         while not stop.is_set():
             self.spin()
             wait_s = seconds(self._next_due_ns() - self.clock.monotonic_ns())
-            with self._wake:
-                if not self._woken and wait_s > 0:
-                    self._wake.wait(min(wait_s, HEALTH_PERIOD_S))
-                self._woken = False
+            self._idle.acquire(timeout=min(max(wait_s, 0.0), HEALTH_PERIOD_S))
 
     def wake(self) -> None:
         """End the current wait of `run`; safe from any thread, not from a signal handler."""
@@ -263,10 +271,9 @@ class Node:
         self.publishes(f"health/{self.service}")
 
     def _notify(self) -> None:
-        waiting = self._waiting
-        with waiting._wake:
-            waiting._woken = True
-            waiting._wake.notify()
+        # Already released: it has been woken and has not looked yet.
+        with contextlib.suppress(RuntimeError):
+            self._waiting._idle.release()
 
     def _next_due_ns(self) -> int:
         return min(timer.due_ns for node in (self, *self._besides) for timer in node._timers)
@@ -279,7 +286,7 @@ class Node:
             subscription.rejected += 1
             self._warn.warning(f"{topic.name}: invalid payload dropped: {error}")
             return
-        if topic.delivery is Delivery.COMMAND:
+        if subscription.ages and topic.delivery is Delivery.COMMAND:
             # A process that stood still must not act on what was meant for the time before.
             age_s = seconds(self.clock.monotonic_ns() - arrival_ns)
             if age_s > topic.max_age_s:

@@ -1,23 +1,25 @@
 """Wiring of the simulator: a clock or the commands drive its steps, messages come out."""
 
-from collections import deque
 from functools import partial
 
 from common import messages as m
-from common.clock import seconds
+from common.clock import nanoseconds
 from common.node import Node, RefusedError
 from services.sim.cameras import VIDEO_TOPICS, Camera, Shot, cameras_of
 from services.sim.config import Config
 from services.sim.core import PHYSICS_HZ, ResetError, Simulation
 from services.sim.crew import crew_of, names_of
+from services.sim.inbox import Inbox
 from services.sim.pace import Pace
 from services.sim.studio import Studio
 from services.sim.vehicle import WATCHDOG_S
 
 TICK_S = 0.005
 """The period of the IMU, so that each sample leaves when it is due."""
-COMMAND_DEPTH = 16
+COMMAND_DEPTH = 64
 """Commands between two ticks all count, since one of them may say take off or land."""
+BACKLOG = 3000
+"""In lock-step, commands of a minute may wait for those of another vehicle."""
 STEPS_A_COMMAND = PHYSICS_HZ // 50
 """In lock-step each command is that of the next 20 ms, its period."""
 IDLE_S = 0.5
@@ -45,7 +47,8 @@ def wire(node: Node, config: Config) -> None:
     # Both clocks at once, or stamps would stay behind by what it takes to build the world.
     pace = Pace(node.clock.monotonic_ns())
     simulation = Simulation(config, 0 if in_lockstep else node.clock.utc_ns())
-    heard: list[deque[tuple[m.Command, int]]] = [deque(maxlen=COMMAND_DEPTH) for _ in nodes]
+    depth = BACKLOG if in_lockstep else COMMAND_DEPTH
+    heard = [Inbox(depth) for _ in nodes]
     studio: Studio | None = None
 
     def cameras() -> list[Camera]:
@@ -75,17 +78,18 @@ def wire(node: Node, config: Config) -> None:
                 studio.finish()
 
     def tick(now_ns: int) -> None:
+        since_ns = now_ns - nanoseconds(WATCHDOG_S)
         for _ in range(pace.due(now_ns)):
-            advance([_next_fresh(waiting, now_ns) for waiting in heard])
+            advance([waiting.newest(since_ns) for waiting in heard])
 
     def hear(index: int, command: m.Command, arrival_ns: int) -> None:
-        heard[index].append((command, arrival_ns))
+        heard[index].put(command, arrival_ns)
 
     def obey(index: int, command: m.Command, arrival_ns: int) -> None:
         hear(index, command, arrival_ns)
         while all(heard):
             pace.note(arrival_ns, STEPS_A_COMMAND)
-            advance([waiting.popleft()[0] for waiting in heard])
+            advance([waiting.next() for waiting in heard])
             for _ in range(STEPS_A_COMMAND - 1):
                 advance([None] * len(nodes))
 
@@ -117,6 +121,9 @@ def wire(node: Node, config: Config) -> None:
         silent = [name for name, waiting in zip(names, heard, strict=True) if not waiting]
         if in_lockstep and 0 < len(silent) < len(nodes):
             detail = f"{detail}, waiting for a command of {', '.join(silent)}"
+        lost = sum(waiting.dropped for waiting in heard)
+        if lost:
+            detail = f"{detail}, {lost} commands dropped: too many at once"
         is_late = factor < LOW_FACTOR and not in_lockstep
         if studio is None:
             return ("degraded" if is_late else "ok"), f"{detail}, no pictures"
@@ -129,9 +136,10 @@ def wire(node: Node, config: Config) -> None:
     for index, each in enumerate(nodes):
         each.publishes("imu", "truth", "altimeter", "vehicle", *VIDEO_TOPICS)
         if in_lockstep:
-            each.on("command", partial(obey, index), depth=COMMAND_DEPTH, timed=True)
+            # Their time is the steps': however long these take, a command is that of the next ones.
+            each.on("command", partial(obey, index), depth=depth, timed=True, ages=False)
         else:
-            each.on("command", partial(hear, index), depth=COMMAND_DEPTH)
+            each.on("command", partial(hear, index), depth=depth)
         each.answer("sim/reset", partial(reset, index))
         each.answer("sim/worlds", names_worlds)
         each.reports(health)
@@ -140,12 +148,3 @@ def wire(node: Node, config: Config) -> None:
     else:
         node.every(TICK_S, tick, timed=True)
     node.on_close(simulation.close)
-
-
-def _next_fresh(heard: deque[tuple[m.Command, int]], now_ns: int) -> m.Command | None:
-    """The oldest command that is not worthless yet."""
-    while heard:
-        command, arrival_ns = heard.popleft()
-        if seconds(now_ns - arrival_ns) <= WATCHDOG_S:
-            return command
-    return None

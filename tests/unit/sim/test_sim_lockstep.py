@@ -7,7 +7,7 @@ from flights import command
 
 from common.clock import ManualClock
 from common.memory_bus import MemoryBus, MemoryNetwork
-from common.messages import Image, Pose, ResetRequest, decode, encode
+from common.messages import Image, Pose, ResetRequest, VehicleStatus, decode, encode
 from common.node import Node
 from common.topics import key_of
 from services.sim.body import Sticks
@@ -103,6 +103,32 @@ def test_pictures_noise_is_that_of_the_seed_which_a_reset_gives() -> None:
         reset(ResetRequest(position=(0.0, 0.0, 1.0), seed=9), 0)
         assert pictures(7) == first
         assert not set(first) & set(other)
+
+
+def test_no_action_is_lost_while_another_vehicle_is_silent() -> None:
+    config = Config(clock="lockstep", renderer="none", vehicles="tum,second=tum", world="empty")
+    with stage(config) as (node, clock, heard):
+        ask = MemoryBus(node.bus._network)  # type: ignore[attr-defined]
+        told: list[bytes] = []
+        ask.subscribe(key_of("unit", "vehicle"), told.append)
+        first, second = (
+            ask.publication(key_of(name, "command"), None, "")  # type: ignore[arg-type]
+            for name in ("unit", "second")
+        )
+        for action in ["takeoff"] * 2 + ["fly"] * 98:
+            first.put(encode(command(action=action)))
+            node.spin()
+            clock.advance(0.02)
+        assert heard["truth"] == []
+        for _ in range(100):
+            second.put(encode(command()))
+        # However long they wait: simulated time has not gone on meanwhile.
+        clock.advance(10.0)
+        node.spin()
+        states = [decode(payload, VehicleStatus).state for payload in told]
+        assert len(heard["truth"]) == 200
+        assert "taking_off" in states
+        assert states[-1] == "flying"
 
 
 def test_with_several_vehicles_physics_waits_for_the_command_of_each() -> None:
