@@ -10,10 +10,11 @@ import os
 import signal
 from collections import deque
 from contextlib import suppress
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 from common import messages as m
-from services.sim.cameras import Shot, cameras_of
+from services.sim.cameras import Camera, Shot
 from services.sim.config import Config
 from services.sim.core import Simulation
 from services.sim.stage import Scene
@@ -28,8 +29,16 @@ LLVMPIPE_THREADS = "2"
 Answer = m.Image | Exception | None
 
 
+@dataclass(frozen=True, eq=False)
+class Stand:
+    """What is before the cameras, and the cameras."""
+
+    scene: Scene
+    cameras: list[Camera]
+
+
 class Order:
-    """A picture that was asked for, or a scene that was given.
+    """A picture that was asked for, or a stand that was given.
 
     Attributes:
         painter: who draws it.
@@ -68,8 +77,9 @@ class Darkroom:
     """Develops what the simulator's cameras take.
 
     Args:
-        simulation: in whose present world pictures are taken; after a change of the world, `load`.
-        config: of its cameras and its renderer.
+        simulation: in whose present world, by whose vehicles' cameras, pictures are taken; after a
+            change of either, `load`.
+        config: of its renderer.
 
     Raises:
         NoOpenGlError: if OpenGL was asked for and there is none.
@@ -78,16 +88,18 @@ class Darkroom:
     def __init__(self, simulation: Simulation, config: Config) -> None:
         self._simulation = simulation
         self._config = config
-        self._pixels = {
-            camera.topic: camera.lens.width * camera.lens.height for camera in cameras_of(config)
-        }
         self._painters = [_Painter(config)]
         self.load()
 
     def load(self) -> None:
         """Take pictures of the simulator's present world from now on."""
-        self._scene = self._simulation.scene()
-        for order in [painter.ask(self._scene, 0) for painter in self._painters]:
+        cameras = self._simulation.cameras()
+        self._stand = Stand(self._simulation.scene(), cameras)
+        self._pixels = {
+            (camera.vehicle, camera.topic): camera.lens.width * camera.lens.height
+            for camera in cameras
+        }
+        for order in [painter.ask(self._stand, 0) for painter in self._painters]:
             order.wait()
 
     def develop(self, shot: Shot) -> Order:
@@ -95,9 +107,9 @@ class Darkroom:
         painter = min(self._painters, key=_Painter.pixels_to_draw)
         if painter.pixels_to_draw() and len(self._painters) < PAINTERS:
             painter = _Painter(self._config)
-            painter.ask(self._scene, 0)
+            painter.ask(self._stand, 0)
             self._painters.append(painter)
-        return painter.ask(shot, self._pixels[shot.topic])
+        return painter.ask(shot, self._pixels[shot.vehicle, shot.topic])
 
     def close(self) -> None:
         """End the processes."""
@@ -123,8 +135,8 @@ class _Painter:
             self.receive()
         return sum(order.pixels for order in self._orders)
 
-    def ask(self, what: Scene | Shot, pixels: int) -> Order:
-        """Give it a scene or a shot."""
+    def ask(self, what: Stand | Shot, pixels: int) -> Order:
+        """Give it a stand or a shot."""
         order = Order(self, pixels)
         self._orders.append(order)
         # One that has ended says so where its answer is wanted.
@@ -147,20 +159,22 @@ class _Painter:
 
 
 def _paint(pipe: Connection, config: Config) -> None:
-    """Answer scenes and shots until the other end is closed."""
+    """Answer stands and shots until the other end is closed."""
     # The key goes to all processes; the flight's end closes the pipe.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    cameras = {camera.topic: camera for camera in cameras_of(config)}
+    cameras: dict[tuple[int, str], Camera] = {}
     os.environ.setdefault("LP_NUM_THREADS", LLVMPIPE_THREADS)
     try:
         renderer = open_renderer(config.renderer)
         while True:
             answer: Answer = None
             asked = pipe.recv()
-            if isinstance(asked, Scene):
-                renderer.load(asked)
+            if isinstance(asked, Stand):
+                cameras = {(camera.vehicle, camera.topic): camera for camera in asked.cameras}
+                renderer.load(asked.scene)
             else:
-                answer = photograph(renderer, cameras[asked.topic], asked, config.jpeg_quality)
+                camera = cameras[asked.vehicle, asked.topic]
+                answer = photograph(renderer, camera, asked, config.jpeg_quality)
             pipe.send(answer)
     except (EOFError, OSError):
         return

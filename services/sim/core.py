@@ -12,6 +12,7 @@ from services.sim import plants
 from services.sim.actor import PHYSICS_HZ, STEP_NS, STEP_S, Actor, Step
 from services.sim.body import BodyState, Vector3
 from services.sim.build import Build
+from services.sim.cameras import Camera, cameras_of
 from services.sim.config import Config
 from services.sim.crew import crew_of
 from services.sim.hull import Hull
@@ -87,6 +88,14 @@ class Simulation:
     def scene(self) -> Scene:
         """What cameras see, besides vehicles."""
         return self._stage.scene()
+
+    def cameras(self) -> list[Camera]:
+        """Those of all vehicles."""
+        return [
+            camera
+            for actor in self.actors
+            for camera in cameras_of(self._config, actor.index, actor.plant.build)
+        ]
 
     def status(self) -> m.VehicleStatus:
         """The first vehicle's own state."""

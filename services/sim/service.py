@@ -5,7 +5,7 @@ from functools import partial
 from common import messages as m
 from common.clock import nanoseconds
 from common.node import Node, RefusedError
-from services.sim.cameras import VIDEO_TOPICS, Camera, Shot, cameras_of
+from services.sim.cameras import VIDEO_TOPICS, Shot
 from services.sim.config import Config
 from services.sim.core import PHYSICS_HZ, ResetError, Simulation
 from services.sim.crew import crew_of, names_of
@@ -51,18 +51,11 @@ def wire(node: Node, config: Config) -> None:
     heard = [Inbox(depth) for _ in nodes]
     studio: Studio | None = None
 
-    def cameras() -> list[Camera]:
-        return [
-            camera
-            for actor in simulation.actors
-            for camera in cameras_of(config, actor.index, actor.plant.build)
-        ]
-
     def show(shot: Shot, picture: m.Image) -> None:
         nodes[shot.vehicle].publish(shot.topic, picture)
 
     if config.renderer != "none":
-        studio = Studio(config.renderer, cameras(), config.jpeg_quality, show)
+        studio = Studio(config.renderer, simulation.cameras(), config.jpeg_quality, show)
         studio.load(simulation.scene())
         node.on_close(studio.close)
 
@@ -107,7 +100,7 @@ def wire(node: Node, config: Config) -> None:
             if other == index or simulation.world != before:
                 waiting.clear()
         if studio is not None:
-            studio.load(simulation.scene(), cameras())
+            studio.load(simulation.scene(), simulation.cameras())
         return status
 
     def names_worlds(_request: m.WorldsRequest, _now_ns: int) -> m.WorldsReply:
