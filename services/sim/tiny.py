@@ -1,6 +1,7 @@
 """Pictures by pybullet's TinyRenderer, for machines without OpenGL: plain colours, no sky, slow."""
 
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +10,29 @@ import numpy as np
 import pybullet
 
 from common.camera import Lens
-from services.sim.cameras import Camera, Shot
+from services.sim.body import Quaternion, Vector3
+from services.sim.cameras import Camera, Figure, Shot
 from services.sim.renderer import FAR_M, view_of
 from services.sim.stage import Scene, add_visible
 from services.sim.textures import Picture, paint
-from worlds import Texture
+from worlds import Body, Texture
 
 GROUND_SIDE_M = 60.0
 _GROUND_PIXELS = 2000
 _TO_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 """From the optical frame to OpenGL's camera frame: y up, looking along -z."""
+
+
+_OUT_OF_SIGHT_M: Vector3 = (0.0, 0.0, -1000.0)
+_UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Puppet:
+    """What stands for a vehicle that looks so: its bodies' numbers in pybullet."""
+
+    look: tuple[Body, ...]
+    numbers: list[int]
 
 
 class TinyRenderer:
@@ -29,13 +43,13 @@ class TinyRenderer:
     def __init__(self) -> None:
         self._on = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
         self._scratch = tempfile.TemporaryDirectory()
-        self._figures: list[int] = []
+        self._puppets: list[_Puppet] = []
         self._colours: dict[Texture, tuple[float, ...]] = {}
 
     def load(self, scene: Scene) -> None:
         """Draw this scene from now on."""
         pybullet.resetSimulation(**self._on)
-        self._figures.clear()
+        self._puppets.clear()
         for body in scene.bodies:
             add_visible(body, self._colour_of(body.texture), **self._on)
         half = GROUND_SIDE_M / 2.0
@@ -53,13 +67,7 @@ class TinyRenderer:
     def draw(self, camera: Camera, shot: Shot) -> Picture:
         """The picture (height, width, 3) in BGR."""
         lens = camera.lens
-        for number in self._figures:
-            pybullet.removeBody(number, **self._on)
-        self._figures = [
-            add_visible(body, self._colour_of(body.texture), **self._on)
-            for other in shot.others
-            for body in other.bodies()
-        ]
+        self._stage(shot.others)
         view, projection = matrices_of(camera, shot)
         pixels = pybullet.getCameraImage(
             lens.width,
@@ -72,6 +80,32 @@ class TinyRenderer:
         )[2]
         picture = np.asarray(pixels, np.uint8).reshape(lens.height, lens.width, 4)
         return np.asarray(picture[..., 2::-1], np.uint8)
+
+    def _stage(self, figures: tuple[Figure, ...]) -> None:
+        """Put the other vehicles where they are.
+
+        What was made for a picture is moved for the next one: pybullet keeps 2 kB of each body that
+        is made and removed again.
+        """
+        idle = list(self._puppets)
+        for figure in figures:
+            bodies = figure.bodies()
+            puppet = next((each for each in idle if each.look == figure.look), None)
+            if puppet is None:
+                numbers = [
+                    add_visible(body, self._colour_of(body.texture), **self._on) for body in bodies
+                ]
+                self._puppets.append(_Puppet(figure.look, numbers))
+                continue
+            idle.remove(puppet)
+            for number, body in zip(puppet.numbers, bodies, strict=True):
+                self._move(number, body.position_m, body.orientation)
+        for puppet in idle:
+            for number in puppet.numbers:
+                self._move(number, _OUT_OF_SIGHT_M, _UPRIGHT)
+
+    def _move(self, number: int, position_m: Vector3, orientation: Quaternion) -> None:
+        pybullet.resetBasePositionAndOrientation(number, position_m, orientation, **self._on)
 
     def _colour_of(self, texture: Texture) -> tuple[float, ...]:
         if texture not in self._colours:

@@ -14,15 +14,19 @@ from flights import command
 import worlds
 from cli.main import main
 from common import log, run
+from common.camera import Lens
 from common.config import ConfigError, load
 from common.messages import Command, Message, ResetRequest, encode
+from services.sim import tiny
 from services.sim.body import Sticks
 from services.sim.cameras import Shot, cameras_of
 from services.sim.config import Config
 from services.sim.core import APART_M, PHYSICS_HZ, ResetError, Simulation
 from services.sim.crew import crew_of, names_of
 from services.sim.renderer import NoOpenGlError
+from services.sim.stage import add_visible
 from services.sim.studio import open_renderer
+from worlds import Body
 
 Messages = list[tuple[str, Message]]
 
@@ -187,6 +191,37 @@ def test_another_vehicle_is_in_the_picture_where_it_is(choice: Literal["gl", "ti
     assert columns.mean() == pytest.approx(cx - focal * 0.25, abs=15.0)
     assert rows.mean() == pytest.approx(cy, abs=15.0)
     assert np.ptp(columns) == pytest.approx(focal * 0.26, rel=0.25)
+
+
+def test_the_fallback_remakes_no_vehicle_for_the_next_picture(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each would cost it 2 kB for ever."""
+    made: list[Body] = []
+
+    def make(body: Body, colour: tuple[float, ...], **on: int) -> int:
+        made.append(body)
+        return add_visible(body, colour, **on)
+
+    monkeypatch.setattr(tiny, "add_visible", make)
+    simulation = Simulation(Config(world="empty", vehicles="tum,rover,ardrone"))
+    _, taken = fly_all(simulation, 0.1, None, None, None)
+    renderer = tiny.TinyRenderer()
+    renderer.load(simulation.scene())
+    camera = replace(simulation.cameras()[1], lens=Lens.of_view(32, 24, 0.9))
+    shots = [replace(each, topic=camera.topic) for shots in taken for each in shots]
+    alone = renderer.draw(camera, replace(shots[0], others=()))
+    for shot in shots:
+        renderer.draw(camera, shot)
+    looks = [each.plant.build.look for each in simulation.actors]
+    assert len(made) == sum(map(len, looks))
+    for shot in shots * 5:
+        renderer.draw(camera, shot)
+    assert len(made) == sum(map(len, looks))
+    # Those who are not in a picture leave no trace in it.
+    assert np.array_equal(renderer.draw(camera, replace(shots[0], others=())), alone)
+    renderer.close()
+    simulation.close()
 
 
 @pytest.mark.parametrize(
