@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import psutil
-from bench import Row, fly, report
+from bench import WARM_UP_S, Meter, Row, fly, report
 from peers import PEER_HZ, PeerPhysics, egl_camera, tiny_camera
 from rich.console import Console
 from rich.progress import Progress
@@ -22,7 +22,7 @@ from workers import Worker
 import worlds
 from cli import launch
 from common import messages as m
-from common.clock import SystemClock, seconds
+from common.clock import SystemClock, seconds, sleep
 from common.node import Node
 from common.topics import SERVICES, TOPICS
 from common.zenoh_bus import ZenohBus
@@ -38,6 +38,7 @@ from services.operator.route import route_of
 from services.sim.cameras import SIZES, Shot, cameras_of
 from services.sim.config import Config, FrontSize
 from services.sim.core import PHYSICS_HZ, STEP_S, Simulation
+from services.sim.crew import crew_of, names_of
 from services.sim.stage import Scene, Stage
 from services.sim.studio import Studio
 from services.synthesis.config import Config as SynthesisConfig
@@ -53,6 +54,8 @@ SOAK_DRIFT_MS = 5.0
 PEER_CAMERAS = {"EGL plugin": 8, "TinyRenderer": 20}
 """How many times slower they are to be."""
 FEW = 4
+FLEET = 3
+"""Vehicles that share a simulator."""
 
 
 @dataclass(frozen=True)
@@ -308,6 +311,49 @@ def _bar(bars: dict[str, float], figure: str) -> str:
     return f">= {bars[figure]:g}" if figure in bars else ""
 
 
+def several(duration_s: float, progress: Progress) -> list[Row]:
+    """Vehicles one behind the other on the track, each with both cameras, 640x360 and QVGA."""
+    settings = {"sim": {"world": "track", "vehicles": FLEET}}
+    with launch.running(("sim",), settings) as system:
+        names = names_of(crew_of(FLEET, "tum"), system.vehicle)
+        meters = [Meter(system.endpoint, name) for name in names]
+        launch.wait_alive(system, meters[0].alive, ("sim",), threading.Event(), 60.0)
+        for meter, place in zip(meters, worlds.load("track").ideal_path_m[::40], strict=False):
+            position = (float(place[0]), float(place[1]), 1.0)
+            meter.node.ask("sim/reset", m.ResetRequest(position=position))
+        while not all(meter.counts["camera/front"] for meter in meters):
+            for meter in meters:
+                meter.node.spin()
+            system.check()
+            sleep(0.01)
+        task = progress.add_task(f"{FLEET} vehicles with pictures", total=duration_s)
+        clock = SystemClock()
+        # First it catches up what it lost while it began.
+        for length_s in (WARM_UP_S, duration_s):
+            for meter in meters:
+                meter.clear()
+            begin_ns = clock.monotonic_ns()
+            while (passed_s := seconds(clock.monotonic_ns() - begin_ns)) < length_s:
+                for meter in meters:
+                    meter.node.spin()
+                system.check()
+                sleep(0.005)
+                progress.update(task, completed=passed_s)
+        rates = [{topic: n / passed_s for topic, n in meter.counts.items()} for meter in meters]
+        factor = meters[0].real_time_factor
+        for meter in meters:
+            meter.node.close()
+    share = f"{FLEET} vehicles with 640x360 and QVGA"
+    rows = [Row(f"{share}: real-time factor", factor, 1.0, ">= 0.99")]
+    for topic in ("camera/front", "camera/down", "imu"):
+        rate_hz = TOPICS[topic].rate_hz or 0.0
+        rows += [
+            Row(f"{share}: {topic} of the {place} (Hz)", each[topic], rate_hz)
+            for place, each in zip(("first", "second", "third"), rates, strict=True)
+        ]
+    return rows
+
+
 def soak(duration_s: float, progress: Progress) -> list[Row]:
     """Real time for long: memory that grows, stamps that leave the wall clock."""
     clock = SystemClock()
@@ -359,6 +405,7 @@ PARTS: dict[str, Callable[[argparse.Namespace, Progress], list[Row]]] = {
     "localized": lambda options, progress: localized(options.seconds / 2.0, progress),
     "cameras": lambda _options, progress: cameras(progress),
     "everything": lambda options, progress: everything(options.seconds, progress),
+    "several": lambda options, progress: several(options.seconds / 2.0, progress),
     "soak": lambda options, progress: soak(options.soak, progress),
 }
 
