@@ -28,7 +28,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--out",
         metavar="FOLDER",
         type=Path,
-        help="where results and report go (evaluation, or evaluation-quick with --quick)",
+        default=Path("evaluation"),
+        help="where results and report go, with --quick into quick/ in it (evaluation)",
     )
     parser.add_argument(
         "--seeds",
@@ -111,9 +112,8 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueError("--docs: figures of a quick run mean nothing; leave --quick out")
     if options.report:
         models, options.people = (), False
-    out: Path = options.out or Path("evaluation-quick" if options.quick else "evaluation")
     order = Order(
-        out=out,
+        out=options.out,
         seeds=seeds,
         models=models,
         size="quick" if options.quick else "full",
@@ -125,7 +125,7 @@ def _run(options: argparse.Namespace) -> int:
         tables = evaluate(order, SystemClock(), _Bars(progress).show)
     for table in tables:
         console.print(_grid(table))
-    console.print(f"{out / 'report.html'}  {out / 'report.md'}")
+    console.print(f"{order.folder / 'report.html'}  {order.folder / 'report.md'}")
     return 0
 
 

@@ -1,6 +1,8 @@
 """Against each bar: what was found, whether it is met, and by how much it is missed."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from services.classifier.window import WINDOW_S
@@ -21,6 +23,8 @@ LEVEL = 5e-4
 """F1 that differ by less look the same in a table."""
 GAINED_POINTS, LOST_POINTS = 3.0, 0.5
 P50_S, P99_S = 0.2e-3, 0.3e-3
+Asked = Callable[[Results, str], Estimate]
+"""A figure of a classifier."""
 
 
 @dataclass(frozen=True)
@@ -52,47 +56,75 @@ def at_most(found: float, bar: float, digits: int = 3) -> str:
     return "met" if found <= bar else f"over by {found - bar:.{digits}f}"
 
 
-def _best(values: dict[str, Estimate]) -> tuple[str, float]:
-    """The best peer and what it reaches."""
-    values = {name: value for name, value in values.items() if value.count}
-    if not values:
-        return "-", float("-inf")
-    name = max(values, key=lambda name: values[name].mean)
-    return f"{name} {values[name].text()}", values[name].mean
+def _best(
+    results: Results, of: Asked, digits: int = 3, scale: float = 1.0, *, least: bool = False
+) -> tuple[str, float]:
+    """The best peer, and how far it is ahead of ours on the seeds that both have.
+
+    Args:
+        results: of the evaluation.
+        of: a figure of a classifier.
+        digits: of the figure in the text.
+        scale: likewise.
+        least: whether less of it is better.
+    """
+    ours = of(results, OURS)
+    best, text = float("-inf"), "-"
+    for name in results.peers:
+        common = results.beside(name)
+        peer, beside = of(common, name), of(common, OURS)
+        if not peer.count:
+            continue
+        ahead = beside.mean - peer.mean if least else peer.mean - beside.mean
+        if ahead > best:
+            best, text = ahead, f"{name} {peer.text(digits, scale)}"
+            if peer.count < ours.count:
+                shown = beside.text(digits, scale)
+                text += f" ({peer.count} of {ours.count}; ours on these {shown})"
+    return text, best
 
 
-def _above(found: float, bar: float, peer: float) -> str:
-    """The verdict where a bar is to be met and every peer beaten."""
+def _above(found: float, bar: float, ahead: float) -> str:
+    """The verdict where a bar is to be met and every peer beaten.
+
+    Args:
+        found: ours.
+        bar: to be met.
+        ahead: of ours is the best peer by so much.
+    """
     verdict = at_least(found, bar)
-    if found > peer:
+    if ahead < 0.0:
         return verdict
-    is_level = peer - found < LEVEL
-    behind = "level with a peer" if is_level else f"{peer - found:.3f} below a peer"
+    behind = "level with a peer" if ahead < LEVEL else f"{ahead:.3f} below a peer"
     return f"not met: {behind}" if verdict == "met" else f"{verdict}, {behind}"
 
 
+def _f1_of(people: str, moment: str = WHOLE) -> Asked:
+    return lambda results, name: results.f1(name, people, moment)
+
+
+def _swapped(results: Results, name: str) -> Estimate:
+    """Arcs and sines that are taken for each other."""
+    return estimate(t.arc_sine for t in results.tallies(name, CALIBRATED, WHOLE))
+
+
 def _calibrated(results: Results) -> list[Bar]:
-    found = results.f1(OURS, CALIBRATED)
-    text, peer = _best({name: results.f1(name, CALIBRATED) for name in results.peers})
-    swapped = {
-        name: estimate(t.arc_sine for t in results.tallies(name, CALIBRATED, WHOLE))
-        for name in results.models
-    }
-    least = min(results.peers, key=lambda name: swapped[name].mean, default=None)
+    found, swapped = results.f1(OURS, CALIBRATED), _swapped(results, OURS)
+    text, ahead = _best(results, _f1_of(CALIBRATED))
     return [
         Bar(
             "F1, calibrated people held out",
             f">= {CALIBRATED_F1}, above peers",
             found.text(),
             text,
-            _above(found.mean, CALIBRATED_F1, peer),
+            _above(found.mean, CALIBRATED_F1, ahead),
         ),
         Bar(
             "arcs and sines taken for each other",
             f"<= {ARC_SINE:.0%}",
-            f"{swapped[OURS].text(1, 100)} %",
-            "-" if least is None else f"{least} {swapped[least].text(1, 100)} %",
-            at_most(100.0 * swapped[OURS].mean, 100.0 * ARC_SINE, 1),
+            f"{swapped.text(1, 100)} %",
+            _best(results, _swapped, 1, 100, least=True)[0],
+            at_most(100.0 * swapped.mean, 100.0 * ARC_SINE, 1),
         ),
     ]
 
@@ -103,9 +135,8 @@ def _families(results: Results) -> list[Bar]:
         found = results.f1(OURS, FAMILY + family)
         if not found.count:
             continue
-        peers = {name: results.f1(name, FAMILY + family) for name in results.peers}
-        text, peer = _best(peers)
-        verdict = _above(found.mean, FAMILY_F1, peer)
+        text, ahead = _best(results, _f1_of(FAMILY + family))
+        verdict = _above(found.mean, FAMILY_F1, ahead)
         rows.append(
             Bar(
                 f"F1, family left out: {family}",
@@ -115,14 +146,13 @@ def _families(results: Results) -> list[Bar]:
                 verdict,
             )
         )
-    means = {name: results.of_families(name) for name in results.peers}
     met = sum(row.verdict == "met" for row in rows)
     every = "met" if met == len(rows) else f"not met: {met} of {len(rows)} families are"
     total = Bar(
         "F1, mean over families left out",
         "as each of them",
         results.of_families(OURS).text(),
-        _best(means)[0],
+        _best(results, Results.of_families)[0],
         every,
     )
     return [total, *rows] if rows else []
@@ -132,14 +162,14 @@ def _early(results: Results) -> list[Bar]:
     rows = []
     for moment, bar in EARLY_F1.items():
         found = results.f1(OURS, CALIBRATED, moment)
-        text, peer = _best({name: results.f1(name, CALIBRATED, moment) for name in results.peers})
+        text, ahead = _best(results, _f1_of(CALIBRATED, moment))
         rows.append(
             Bar(
                 f"F1 after {moment}, calibrated people",
                 f">= {bar:.2f}, above peers",
                 found.text(),
                 text,
-                _above(found.mean, bar, peer),
+                _above(found.mean, bar, ahead),
             )
         )
     return rows
@@ -232,14 +262,13 @@ def _robust(results: Results) -> list[Bar]:
     rows = []
     for name in (name for name in first["distorted"] if name != UNCHANGED):
         lost = points_lost(results, OURS, name)
-        peers = {peer: points_lost(results, peer, name) for peer in results.peers}
-        least = min(peers, key=lambda peer: peers[peer].mean, default=None)
+        best, _ = _best(results, partial(points_lost, distortion=name), 1, least=True)
         rows.append(
             Bar(
                 f"F1 lost with {name}",
                 f"<= {ROBUST_POINTS:g} points",
                 lost.text(1),
-                "-" if least is None else f"{least} {peers[least].text(1)}",
+                best,
                 at_most(lost.mean, ROBUST_POINTS, 1),
             )
         )

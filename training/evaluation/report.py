@@ -40,7 +40,8 @@ def _bars(results: Results) -> Table:
     return Table(
         "Against the bars",
         f"Ours: {_numbers(results, OURS)}. A family is left out in one seed: no interval."
-        " Intervals of adaptation and of the mean over families are over people and families.",
+        " Intervals of adaptation and of the mean over families are over people and families."
+        " A peer that lacks seeds is compared with ours on those it has: how many, in brackets.",
         ("question", "bar", "ours", "best peer", "verdict"),
         rows,
     )
@@ -103,7 +104,7 @@ def _families(results: Results) -> Table:
         "Each family left out",
         "Weighted F1 at the end, of people of a kind that nobody in the training is of. n:"
         " primitives.",
-        ("family", "n", *results.models),
+        ("family", "n", *(results.titled(model) for model in results.models)),
         tuple(rows),
     )
 
@@ -120,7 +121,7 @@ def _early(results: Results) -> Table:
                 ).text()
                 for moment in MOMENTS
             )
-            rows.append((model, text, *scores))
+            rows.append((results.titled(model), text, *scores))
     return Table(
         "So long after a motion began",
         f"Weighted F1. {_numbers(results)}, or over families.",
@@ -175,7 +176,7 @@ def _robust(results: Results) -> Table:
     names = tuple(name for name in first["distorted"] if name != UNCHANGED)
     count = Tally.from_json(first["distorted"][UNCHANGED]).count
     rows = tuple(
-        (model, *(points_lost(results, model, name).text(1) for name in names))
+        (results.titled(model), *(points_lost(results, model, name).text(1) for name in names))
         for model in results.models
     )
     return Table(
@@ -188,11 +189,15 @@ def _robust(results: Results) -> Table:
 
 
 def _human(results: Results) -> Table:
-    rows = []
+    rows: list[tuple[str, ...]] = []
+    count = max((len(seeds) for seeds in results.human.values()), default=0)
     for human in HUMAN_SETS:
         seeds = results.human.get(human.name)
         if not seeds:
+            why = results.human_not_run.get(human.name, "not asked for yet")
+            rows.append((human.name, f"not run: {why}", *["-"] * 6))
             continue
+        part = "" if len(seeds) == count else f" ({len(seeds)} of {count} seeds)"
         ours, padded, stretched = (
             estimate(seed[kind] for seed in seeds.values()).text()
             for kind in ("ours", "padded", "stretched")
@@ -200,7 +205,7 @@ def _human(results: Results) -> Table:
         recurrent = human.published.recurrent
         rows.append(
             (
-                human.name,
+                human.name + part,
                 str(int(next(iter(seeds.values()))["n"])),
                 ours,
                 padded,
@@ -210,7 +215,6 @@ def _human(results: Results) -> Table:
                 human.published.source,
             )
         )
-    count = max((len(seeds) for seeds in results.human.values()), default=0)
     return Table(
         "Real people",
         f"Accuracy on the official test split, {count} seeds, mean ± 95 % interval; shoulder"
@@ -241,7 +245,7 @@ def tables_of(results: Results) -> list[Table]:
         if OURS in results.models:
             tables += [_flown(results), _nothing(results)]
         tables.append(_robust(results))
-    if results.human:
+    if results.human or results.human_not_run:
         tables.append(_human(results))
     return tables
 

@@ -2,7 +2,7 @@
 
 import operator
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any
 
@@ -19,6 +19,7 @@ class Results:
         human: by data set, then by seed: `ours`, `padded`, `stretched`, `n`.
         not_run: classifiers without results, and why.
         latency: `p50_s`, `p99_s`, `count` of the shipped model; empty if there is none.
+        human_not_run: data sets of people without results, and why.
         own_split: F1 of the thesis' machine on its own split of 794 vectors, of several sets.
     """
 
@@ -27,6 +28,7 @@ class Results:
     not_run: dict[str, str]
     latency: dict[str, float]
     own_split: tuple[float, ...]
+    human_not_run: dict[str, str] = field(default_factory=dict)
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -46,6 +48,18 @@ class Results:
             for result in seeds.values():
                 found |= {name: None for name in result["sets"] if name.startswith(FAMILY)}
         return tuple(name.removeprefix(FAMILY) for name in found)
+
+    def beside(self, peer: str) -> "Results":
+        """Ours and one of the others, of the seeds that both have."""
+        ours, other = self.judged[OURS], self.judged[peer]
+        seeds = [seed for seed in ours if seed in other]
+        common = {name: {seed: self.judged[name][seed] for seed in seeds} for name in (OURS, peer)}
+        return replace(self, judged=common)
+
+    def titled(self, model: str) -> str:
+        """A classifier's name in tables, with its seeds if others have more."""
+        seeds, most = len(self.judged[model]), max(map(len, self.judged.values()))
+        return model if seeds == most else f"{model} ({seeds} of {most} seeds)"
 
     def tallies(self, model: str, people: str, moment: str) -> list[Tally]:
         """Counts, one a seed that has this set of people."""

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,8 @@ class Order:
     """What is to be evaluated.
 
     Attributes:
-        out: folder of results and report.
+        out: folder of results and report; of another size than full a folder in it, so that a
+            quick run writes over nothing that took hours.
         seeds: of people and training.
         models: classifiers by name; of none, only what is there is reported.
         size: of `SIZES`.
@@ -59,6 +61,11 @@ class Order:
     people: bool = True
     page: Path | None = None
 
+    @property
+    def folder(self) -> Path:
+        """Where everything goes."""
+        return self.out if self.size == "full" else self.out / self.size
+
 
 class Evaluation:
     """Finds what is ordered and not found yet; each result is kept as soon as it is there.
@@ -72,10 +79,8 @@ class Evaluation:
     def __init__(self, order: Order, clock: Clock, report: Report) -> None:
         self._order, self._clock, self._report = order, clock, report
         self._size = SIZES[order.size]
-        # A size has a folder of its own, so that a quick run costs nobody hours of results.
-        part = "" if order.size == "full" else order.size
-        self._cache = Cache(order.out / "results" / part)
-        self._models = order.out / "models" / part
+        self._cache = Cache(order.folder / "results")
+        self._models = order.folder / "models"
         self._not_run: dict[str, str] = {}
         self._marks = Marks(self._size)
         self._recordings = f"{of_recordings()} {order.size}"
@@ -89,12 +94,12 @@ class Evaluation:
             self._seed(seed)
         if not self._order.people:
             return
-        try:
-            for human in HUMAN_SETS:
+        for human in HUMAN_SETS:
+            try:
                 for seed in self._order.seeds:
                     self._person(human, seed)
-        except ModuleNotFoundError as error:
-            self._not_run["recordings of people"] = f"{error.name} is not installed"
+            except ModuleNotFoundError as error:
+                self._not_run[human.name] = why_not(error)
 
     def results(self) -> Results:
         """All that is kept and not stale, of whatever run it is."""
@@ -114,7 +119,8 @@ class Evaluation:
         not_run = {name: self._not_run.get(name, why) for name, why in missing.items()}
         count = LATENCY_WINDOWS[self._order.size]
         fast = vars(latency(OnnxModel(SHIPPED_MODEL), self._clock, count))
-        return Results(judged, human, not_run, fast, self._own_split())
+        lacking = {name: why for name, why in self._not_run.items() if name not in CONTENDERS}
+        return Results(judged, human, not_run, fast, self._own_split(), lacking)
 
     def _seed(self, seed: int) -> None:
         """All classifiers that are ordered on one fold, which is made only if it is wanted."""
@@ -135,7 +141,7 @@ class Evaluation:
             try:
                 fresh = contender(name)
             except ModuleNotFoundError as error:
-                self._not_run[name] = f"{error.name} is not installed"
+                self._not_run[name] = why_not(error)
                 continue
             path = self._models / f"{name}-{seed}.onnx"
             if isinstance(fresh, Ours) and is_kept:
@@ -177,6 +183,8 @@ class Evaluation:
         """One set of recordings and one seed."""
         if self._cache.find(self._recordings, "people", human.name, seed) is not None:
             return
+        # MiniRocket comes last and would be missed only after minutes of training.
+        import_module("aeon")
         steps = STEPS if self._order.size == "full" else 20
         begin_ns = self._clock.monotonic_ns()
         found = judge_human(human, steps, seed, partial(self._telling(seed), human.name))
@@ -197,6 +205,12 @@ class Evaluation:
 
     def _telling(self, seed: int) -> Report:
         return lambda text, done, of: self._report(f"seed {seed}, {text}", done, of)
+
+
+def why_not(error: ModuleNotFoundError) -> str:
+    """What is missing and how to get it."""
+    how = "pip install tensorflow-cpu" if error.name == "tensorflow" else "make evaluate"
+    return f"{error.name} is not installed; {how} installs it"
 
 
 def _loaded(ours: Ours, path: Path) -> bool:
@@ -221,4 +235,4 @@ def evaluate(order: Order, clock: Clock, report: Report) -> Sequence[Table]:
     """
     evaluation = Evaluation(order, clock, report)
     evaluation.find()
-    return write(evaluation.results(), order.out, order.page)
+    return write(evaluation.results(), order.folder, order.page)

@@ -18,7 +18,7 @@ from training.evaluation.hover import Bothered, bothered, shown
 from training.evaluation.latency import latency
 from training.evaluation.measures import Tally
 from training.evaluation.names import CALIBRATED, EVERYTHING, FAMILY, KNOWN, LITE, MOMENTS, OURS
-from training.evaluation.report import write
+from training.evaluation.report import tables_of, write
 from training.evaluation.results import Results
 from training.generator.nothing import KINDS
 from training.generator.people import FAMILIES
@@ -202,6 +202,21 @@ def test_a_bar_is_met_only_above_every_peer() -> None:
     assert verdicts["F1, calibrated people held out"] == "met"
     verdicts = {bar.question: bar.verdict for bar in bars(results(0.92, 0.95))}
     assert verdicts["F1, family left out: calm"] == "short by 0.010, 0.030 below a peer"
+
+
+def test_a_peer_of_fewer_seeds_is_compared_on_those_it_has() -> None:
+    found = results(0.98, 0.90)
+    found.judged[OURS][1] = result(0.92, ["wild"])
+    found.judged["svm"] = {0: result(0.97, ["calm"])}
+    rows = {bar.question: bar for bar in bars(found)}
+    row = rows["F1, calibrated people held out"]
+    assert row.found.startswith("0.950 ±")
+    assert row.peer == "svm 0.970 (1 of 2; ours on these 0.980)"
+    assert row.verdict == "short by 0.020"
+    assert rows["F1, family left out: calm"].peer == "svm 0.970"
+    assert rows["F1, family left out: wild"].peer == "cnn-gru-thesis 0.500"
+    headers = [name for table in tables_of(found) for name in (*table.header, *table.rows[0])]
+    assert "svm (1 of 2 seeds)" in headers
 
 
 def test_the_report_is_markdown_html_and_pictures(tmp_path, monkeypatch) -> None:

@@ -10,10 +10,12 @@ from common.clock import ManualClock
 from training.evaluation import run
 from training.evaluation.contenders import CODE
 from training.evaluation.folds import SIZES
+from training.evaluation.human import HUMAN_SETS, SHOULDER, HumanSet
+from training.evaluation.latency import Latency
 from training.evaluation.marks import Marks
 from training.evaluation.names import OURS, WHOLE
 from training.evaluation.ours import Ours
-from training.evaluation.report import BEGIN
+from training.evaluation.report import BEGIN, tables_of
 from training.evaluation.run import Evaluation, Order
 from training.evaluation.sources import ROOT, code_of
 from training.evaluation.tables import Table
@@ -53,8 +55,13 @@ def marks_of(size: str = "full") -> dict[str, str]:
     return {name: marks.classifier(name) for name in (OURS, "svm")} | besides
 
 
-def test_marks_tell_sizes_classifiers_and_questions_apart() -> None:
-    marks = [*marks_of("full").values(), *marks_of("quick").values()]
+@pytest.fixture(scope="module")
+def before() -> dict[str, str]:
+    return marks_of()
+
+
+def test_marks_tell_sizes_classifiers_and_questions_apart(before: dict[str, str]) -> None:
+    marks = [*before.values(), *marks_of("quick").values()]
     assert len(set(marks)) == len(marks)
 
 
@@ -67,9 +74,8 @@ def test_marks_tell_sizes_classifiers_and_questions_apart() -> None:
     ],
 )
 def test_another_question_makes_what_every_classifier_answered_stale(
-    changed: str, to: object, monkeypatch: pytest.MonkeyPatch
+    changed: str, to: object, before: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before = marks_of()
     monkeypatch.setattr(changed, to)
     after = marks_of()
     stale = {name for name in before if before[name] != after[name]}
@@ -87,9 +93,8 @@ def test_another_question_makes_what_every_classifier_answered_stale(
     ],
 )
 def test_another_source_file_makes_stale_what_follows_from_it(
-    file: str, stale: set[str], monkeypatch: pytest.MonkeyPatch
+    file: str, stale: set[str], before: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before = marks_of()
     read = Path.read_text
 
     def edited(path: Path) -> str:
@@ -128,7 +133,7 @@ class Asked:
         monkeypatch.setattr(run, "judge_human", lambda one, *_: answers("human", {"n": 1.0})(one))
         monkeypatch.setattr(run, "machine_f1", lambda *_: 0.8)
         monkeypatch.setattr(run, "OnnxModel", lambda path: None)
-        monkeypatch.setattr(run, "latency", lambda *_: run.Order(Path()))
+        monkeypatch.setattr(run, "latency", lambda *_: Latency(1e-4, 2e-4, 9))
         monkeypatch.setattr(run, "of_recordings", lambda: "recordings")
         monkeypatch.setattr(run, "Marks", lambda size: self)
         monkeypatch.setattr(Ours, "save", lambda _, path: self.write(path))
@@ -215,10 +220,21 @@ def test_lost_weights_are_trained_anew(asked: Asked, tmp_path: Path) -> None:
     assert asked.run(tmp_path) == ["people", f"judge {OURS}"]
 
 
-def test_a_quick_run_in_the_same_folder_costs_no_results(asked: Asked, tmp_path: Path) -> None:
-    asked.run(tmp_path)
-    assert asked.run(tmp_path, size="quick") != []
-    assert asked.run(tmp_path) == []
+def test_a_quick_run_in_the_same_folder_writes_over_nothing(
+    asked: Asked, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = Table("Bars", "n = 1", ("question", "verdict"), (("F1", "met"),))
+    monkeypatch.setattr("training.evaluation.report.tables_of", lambda _: [table])
+    monkeypatch.setattr("training.evaluation.report.draw", drawn)
+    arguments = ["evaluate", "--out", str(tmp_path), "--models", f"{OURS},svm", "--no-people"]
+    assert main([*arguments, "--seeds", "0"]) == 0
+    kept = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    table = Table("Bars", "n = 1", ("question", "verdict"), (("F1", "short by 0.1"),))
+    asked.done = []
+    assert main([*arguments, "--quick"]) == 0
+    assert f"judge {OURS}" in asked.done
+    assert {path: path.read_bytes() for path in kept} == kept
+    assert "short by" in (tmp_path / "quick" / "report.md").read_text()
 
 
 def test_a_missing_library_is_told_and_the_others_go_on(
@@ -235,7 +251,37 @@ def test_a_missing_library_is_told_and_the_others_go_on(
     )
     evaluation.find()
     assert f"judge {OURS}" in asked.done
-    assert evaluation.results().not_run["svm"] == "sklearn is not installed"
+    assert evaluation.results().not_run["svm"] == (
+        "sklearn is not installed; make evaluate installs it"
+    )
+
+
+def test_a_row_of_people_says_which_library_it_lacks(
+    asked: Asked, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def judge_human(one: HumanSet, *_: Any) -> dict[str, float]:
+        if one.name == SHOULDER:
+            raise ModuleNotFoundError(name="seglearn")
+        return {"ours": 0.9, "padded": 0.8, "stretched": 0.7, "n": 9.0}
+
+    monkeypatch.setattr(run, "import_module", lambda _: None)
+    monkeypatch.setattr(run, "judge_human", judge_human)
+    evaluation = Evaluation(Order(tmp_path, (0,), ()), ManualClock(), quiet)
+    evaluation.find()
+    rows = {row[0]: row[1] for row in tables_of(evaluation.results())[-1].rows}
+    assert len(rows) == len(HUMAN_SETS)
+    assert rows.pop(SHOULDER) == "not run: seglearn is not installed; make evaluate installs it"
+    assert set(rows.values()) == {"9"}
+
+    def missing(name: str) -> None:
+        raise ModuleNotFoundError(name=name)
+
+    monkeypatch.setattr(run, "import_module", missing)
+    evaluation = Evaluation(Order(tmp_path / "other", (0,), ()), ManualClock(), quiet)
+    evaluation.find()
+    rows = {row[0]: row[1] for row in tables_of(evaluation.results())[-1].rows}
+    told = "not run: aeon is not installed; make evaluate installs it"
+    assert rows == dict.fromkeys((one.name for one in HUMAN_SETS), told)
 
 
 def test_the_command_reports_without_training_and_renews_a_page(
