@@ -4,6 +4,7 @@ Decoding refuses a missing field, a wrong type, a value out of its range, NaN an
 fields are ignored. World frame ENU, body frame FLU, SI units, radians, quaternions [x, y, z, w].
 """
 
+import itertools
 import math
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -66,6 +67,15 @@ def _require_finite(value: object, field: str) -> None:
             _require_finite(item, field)
 
 
+def _is_finite_table(rows: list[Any]) -> bool:
+    """Whether these are tuples of numbers, as paths and windows are, with a finite sum."""
+    return (
+        bool(rows)
+        and type(rows[0]) is tuple
+        and math.isfinite(sum(itertools.chain.from_iterable(rows)))
+    )
+
+
 class Payload(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A MessagePack map whose floats are all finite. Optional fields are left out when None."""
 
@@ -80,6 +90,7 @@ class Payload(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
                 or kind is str
                 or (kind is float and math.isfinite(value))
                 or (kind is tuple and math.isfinite(sum(value)))
+                or (kind is list and _is_finite_table(value))
             ):
                 continue
             _require_finite(value, field)

@@ -1,5 +1,7 @@
 """Sticks in, intents out: which primitive the operator has begun, or none."""
 
+import itertools
+
 import numpy as np
 
 from common.clock import NS_PER_S, seconds
@@ -90,7 +92,9 @@ class Classifier:
             raise UnusableSamplesError(
                 f"rate is {rate_hz:g} Hz; use {LOWEST_RATE_HZ:g} to {HIGHEST_RATE_HZ:g}", "rate"
             )
-        sticks = np.array(request.samples, dtype=np.float64)
+        values = itertools.chain.from_iterable(request.samples)
+        # Half of the time of np.array, which looks at each tuple twice.
+        sticks = np.fromiter(values, np.float64, 3 * len(request.samples)).reshape(-1, 3)
         if float(np.abs(sticks).max()) > 1.0:
             raise UnusableSamplesError("samples are fractions of full stick, -1 to 1", "samples")
         span = newest_motion(sticks, rate_hz)

@@ -6,6 +6,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import zenoh
@@ -187,6 +188,18 @@ def test_an_answer_may_come_from_another_thread(join: Join) -> None:
 
     server.serve("ask/later", later)
     assert ask_when_served(asker, "ask/later", b"") == b"at last"
+
+
+def test_questions_of_many_at_once_are_all_answered(join: Join) -> None:
+    server, asker = join(), join()
+    server.serve("ask/many", lambda request: request.reply(request.payload, ENCODING))
+    ask_when_served(asker, "ask/many", b"")
+    questions = [bytes([number]) * 10_000 for number in range(100)]
+    with ThreadPoolExecutor(20) as askers:
+        answers = askers.map(
+            lambda question: asker.ask("ask/many", question, ENCODING, 5.0), questions
+        )
+        assert list(answers) == questions
 
 
 def test_a_refusal_carries_its_payload(join: Join) -> None:

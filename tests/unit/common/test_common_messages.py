@@ -177,6 +177,12 @@ def test_no_float_is_nan_or_infinite(
         m.decode(msgpack.packb(replaced(wire, place, bad)), payload)
 
 
+def test_finite_floats_whose_sum_is_not_are_no_infinity() -> None:
+    huge = (1e308, 1e308, 1e308)
+    request = m.ClassifyRequest(samples=[huge, huge], rate=50.0)
+    assert m.decode(m.encode(request), m.ClassifyRequest) == request
+
+
 @by_payload
 @few
 @given(data=st.data())
