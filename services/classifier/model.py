@@ -11,7 +11,7 @@ import onnxruntime
 from numpy.typing import NDArray
 
 from common.messages import NONE_LABEL, PRIMITIVES
-from services.classifier.window import MODEL_RATE_HZ
+from services.classifier.window import MODEL_RATE_HZ, WINDOW_SAMPLES
 
 Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
@@ -43,7 +43,8 @@ _WANTED_INPUTS = {
     "lengths": ("tensor(int64)", 1),
     "full_yaw_radps": ("tensor(float)", 1),
 }
-_PROBE_SAMPLES = (SHORTEST_SAMPLES, 173, 400)
+_TIMES_S = np.arange(WINDOW_SAMPLES, dtype=np.float32)[None] / np.float32(MODEL_RATE_HZ)
+_PROBE_SAMPLES = (SHORTEST_SAMPLES, 173, WINDOW_SAMPLES)
 _PROBE_FORWARD = (0.5, 0.0)
 
 
@@ -141,14 +142,16 @@ class OnnxModel:
             np.array([len(sticks)], dtype=np.int64),
             np.array([full_yaw_radps], dtype=np.float32),
         )
-        row = probabilities[0].astype(np.float64)
+        # Of so few numbers, lists are quicker than arrays.
+        row, is_meant = probabilities[0].tolist(), float(meant[0])
+        total = sum(row)
         # One comparison each: whatever is NaN fails them too.
-        if not (row.min() >= 0.0 and abs(row.sum() - 1.0) < 1e-3 and 0.0 <= meant[0] <= 1.0):
+        if not (min(row) >= 0.0 and abs(total - 1.0) < 1e-3 and 0.0 <= is_meant <= 1.0):
             raise ModelError(
-                f"model {self._path}: answers {row.tolist()} and {meant[0]} to {len(sticks)}"
+                f"model {self._path}: answers {row} and {is_meant} to {len(sticks)}"
                 " samples, which are no probabilities"
             )
-        return Answer(row / row.sum(), float(meant[0]))
+        return Answer(np.array(row) / total, is_meant)
 
     def answers(
         self, sticks: Array32, lengths: IntArray, full_yaw_radps: Array32
@@ -156,7 +159,8 @@ class OnnxModel:
         """Many windows at once, as they come from the graph.
 
         Args:
-            sticks: (batch, time, 4) at `MODEL_RATE_HZ`, padded with anything to one length.
+            sticks: (batch, time, 4) at `MODEL_RATE_HZ`, padded with anything to one length of at
+                most `WINDOW_SAMPLES`.
             lengths: (batch,) real samples of each.
             full_yaw_radps: (batch,) of each one's vehicle.
 
@@ -167,10 +171,10 @@ class OnnxModel:
             ModelError: if the graph fails on them.
         """
         batch, samples, _ = sticks.shape
-        times_s = np.arange(samples, dtype=np.float32) / np.float32(MODEL_RATE_HZ)
+        times_s = _TIMES_S[:, :samples]
         feed = {
             "sticks": sticks,
-            "times_s": np.ascontiguousarray(np.broadcast_to(times_s, (batch, samples))),
+            "times_s": times_s if batch == 1 else np.repeat(times_s, batch, axis=0),
             "lengths": lengths,
             "full_yaw_radps": full_yaw_radps,
         }
