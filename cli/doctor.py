@@ -109,7 +109,7 @@ def _renderer() -> Finding:
         return Finding(
             "OpenGL over EGL",
             "warn",
-            f"{error}; pictures come from a slower renderer",
+            f"{error}; pybullet's TinyRenderer draws, slowly",
             "apt-get install libegl1 libgl1 libgl1-mesa-dri",
         )
     return Finding("OpenGL over EGL", "ok", str(name))

@@ -10,15 +10,9 @@ from services.sim.body import BodyState, Loads
 from services.sim.hull import Touch
 from services.sim.vehicle import CAPSIZED_COS, Vehicle, lies_still
 
-HARD_MPS = 1.0
-"""To land at this speed, from 5 cm, is a collision."""
-
 
 class Driven(Vehicle):
     """Turns commands into loads, step by step: of what drives."""
-
-    _sinking_mps = 0.0
-    _fell_mps = 0.0
 
     def _obey(self, action: CommandAction, state: BodyState, touch: Touch) -> None:
         if action == "emergency":
@@ -30,12 +24,11 @@ class Driven(Vehicle):
             self.state = "landed"
 
     def _move_on(self, state: BodyState, touch: Touch, below_m: float) -> None:
-        self._fell_mps, self._sinking_mps = self._sinking_mps, -state.velocity_mps[2]
         if state.rotation[8] < CAPSIZED_COS or self.battery == 0.0:
             self.state = "emergency"
 
     def _is_hit(self, touch: Touch) -> bool:
-        return touch.side or self._fell_mps > HARD_MPS
+        return touch.side or self._has_fallen
 
     def _spend(self, loads: Loads) -> None:
         self.battery = max(0.0, self.battery - self._drain)

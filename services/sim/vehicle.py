@@ -20,6 +20,8 @@ landing; here they stop on touching down, since a real drone is not dropped."""
 CAPSIZED_COS = math.cos(1.4)
 """Tilted beyond 1.4 rad the rotors stop, as the real drone's do."""
 STILL_MPS = 0.05
+FALL_MPS = 1.0
+"""To come down at this speed, as from 5 cm, is a crash; the drones land at half of it."""
 COLLISION_GAP_S = 0.25
 """A contact is a new collision after this long without one: a scrape along a fence is one."""
 
@@ -105,6 +107,8 @@ class Vehicle:
         self._sticks = _NEUTRAL
         self._silence_s = 0.0
         self._apart_s = COLLISION_GAP_S
+        self._sinking_mps = 0.0
+        self._has_fallen = False
         self.state: VehicleState = "flying" if flying else "landed"
         self.collisions = 0
         self.has_news = True
@@ -130,6 +134,9 @@ class Vehicle:
             wind_mps: of the air, world.
         """
         was = self.state
+        # What it touches now it has met at the speed of the step before.
+        self._has_fallen = self._sinking_mps > FALL_MPS
+        self._sinking_mps = -state.velocity_mps[2]
         self._listen(command, state, touch)
         self._move_on(state, touch, below_m)
         now = self.state
@@ -205,7 +212,8 @@ class Vehicle:
         self._apart_s = 0.0
 
     def _is_hit(self, touch: Touch) -> bool:
-        return (touch.body and self.state != "landed") or (touch.ground and self.state == "flying")
+        is_up = self.state == "flying" or self._has_fallen
+        return (touch.body and self.state != "landed") or (touch.ground and is_up)
 
 
 def lies_still(state: BodyState, touch: Touch) -> bool:

@@ -3,12 +3,13 @@
 import math
 
 import numpy as np
+import pybullet
 import pytest
 from flights import command, fly, hovering
 from scipy.integrate import solve_ivp
 
-from common.messages import ResetRequest, VehicleStatus
-from services.sim.body import GRAVITY_MPS2, Sticks
+from common.messages import Message, ResetRequest, VehicleStatus
+from services.sim.body import GRAVITY_MPS2, INERTIA_KGM2, MASS_KG, Sticks
 from services.sim.config import Config
 from services.sim.core import PHYSICS_HZ, STEP_S, Simulation
 
@@ -105,6 +106,50 @@ def test_a_bump_into_a_fence_counts_once_however_long_it_lasts() -> None:
     fly(simulation, 1.5, Sticks(vy=-0.5))
     fly(simulation, 3.0, Sticks(vy=0.8))
     assert simulation.status().collisions == 2
+
+
+@pytest.mark.parametrize("plant", ["tum", "ardrone"])
+def test_a_fall_is_a_crash_and_a_landing_or_a_button_on_the_ground_is_none(plant: str) -> None:
+    simulation = hovering(plant=plant, height_m=2.0)
+    _, messages = fly(simulation, 2.0, action="emergency")
+    counted = [each.collisions for each in messages_of(messages, "vehicle")]
+    assert (counted[0], counted[-1]) == (0, 1)
+    fly(simulation, 0.1, action="land")
+    fly(simulation, 3.0, action="takeoff")
+    fly(simulation, 5.0, action="land")
+    assert simulation.status().state == "landed"
+    fly(simulation, 1.0, action="emergency")
+    assert simulation.status().state == "emergency"
+    assert simulation.status().collisions == 1
+    simulation.close()
+
+
+def test_nothing_but_gravity_acts_on_a_body_that_falls() -> None:
+    simulation = hovering(height_m=50.0)
+    fly(simulation, 2.0, Sticks(vx=1.0, wz=1.0))
+    before = simulation.state
+    states, _ = fly(simulation, 2.0, action="emergency")
+    vx, vy, vz = states[-1].velocity_mps
+    assert (vx, vy) == pytest.approx(before.velocity_mps[:2], abs=1e-9)
+    assert vz - before.velocity_mps[2] == pytest.approx(-2.0 * GRAVITY_MPS2, rel=1e-6)
+    # A body that is not round tumbles, but keeps what it turns with.
+    turning = np.asarray(INERTIA_KGM2)
+    spins = [turning * s.to_body(s.angular_velocity_radps) for s in (before, states[-1])]
+    assert np.linalg.norm(spins[1]) == pytest.approx(np.linalg.norm(spins[0]), rel=0.01)
+    simulation.close()
+
+
+def messages_of(messages: list[tuple[str, Message]], topic: str) -> list[VehicleStatus]:
+    return [each for name, each in messages if name == topic]  # type: ignore[misc]
+
+
+def test_pybullet_has_the_stated_weight_and_inertia() -> None:
+    simulation = hovering()
+    hull = simulation.actors[0].hull
+    info = pybullet.getDynamicsInfo(hull._body, -1, physicsClientId=hull._id)
+    assert info[0] == MASS_KG == 0.42
+    assert info[2] == pytest.approx(INERTIA_KGM2)
+    simulation.close()
 
 
 def test_flying_into_the_ground_counts_and_raises_nothing() -> None:
