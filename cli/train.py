@@ -155,12 +155,18 @@ def _finetune(console: Console, options: argparse.Namespace, seed: int, bars: _B
     out = options.out or Path("models/finetuned")
     begin = options.model or Path("models/intent.onnx")
     done = finetune(primitives, begin, out, seed, bars.generating, options.operator)
+    learned = done.learned
     console.print(
-        f"{done.performances} performances by {done.operator}: F1 {done.before:.3f} before;"
-        f" {done.after:.3f} after, on those left out of each of three adaptations"
+        f"{done.performances} performances by {done.operator}: F1 {learned.before:.3f} before;"
+        f" {learned.after:.3f} after, on those left out of each of three adaptations"
     )
-    if not done.of_use:
+    if not learned.of_use:
         console.print("no more of them were named right than before, so the model stays as it was")
+    console.print(
+        f"of those left out {learned.given} of {done.performances} are answered surely enough to"
+        f" be suggested, and {learned.given_right} of these answers are right; the threshold is"
+        " that of the model it began with"
+    )
     console.print(f"{done.path}  sha256 {done.sha256[:8]}")
     return 0
 

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F  # noqa: N812
 
+from training.calibration import scaled
 from training.fit import FULL_YAW_RADPS, THREADS, Fitted, inputs_of, loss_of
 from training.network import Network
 from training.scores import weighted_f1
@@ -46,25 +47,31 @@ class Learned:
         before: F1 of the old one on the performances.
         after: F1 on those left out of each of `FOLDS` adaptations to the others of them.
         of_use: whether more of them were named right than before.
+        given: of those left out, `none` too, so many are answered surely enough to be suggested: by
+            adapted networks, or by the old one if that is kept.
+        given_right: so many of these answers are right.
     """
 
     fitted: Fitted
     before: float
     after: float
     of_use: bool
+    given: int
+    given_right: int
 
 
 @dataclass(frozen=True)
 class _Seen:
-    """Windows as the layers that learn get them: features, each (n, k), and labels (n,)."""
+    """Windows as the layers that learn get them: features, each (n, k), lengths and labels (n,)."""
 
     features: list[Tensor]
+    lengths: Tensor
     labels: Tensor
 
     def rows(self, index: IntArray) -> "_Seen":
         """Those at these places."""
         some = torch.from_numpy(index)
-        return _Seen([each[some] for each in self.features], self.labels[some])
+        return _Seen([each[some] for each in self.features], self.lengths[some], self.labels[some])
 
 
 def _seen(network: Network, windows: Windows) -> _Seen:
@@ -80,7 +87,7 @@ def _seen(network: Network, windows: Windows) -> _Seen:
             parts.append(network.features(*part))
     back = torch.from_numpy(np.argsort(order))
     features = [torch.cat(each)[back] for each in zip(*parts, strict=True)]
-    return _Seen(features, torch.from_numpy(windows.labels))
+    return _Seen(features, torch.from_numpy(windows.lengths), torch.from_numpy(windows.labels))
 
 
 class Adaptation:
@@ -115,23 +122,35 @@ class Adaptation:
         for label in np.unique(own.labels):
             rows = rng.permutation(np.flatnonzero(own.labels == label))
             fold[rows] = np.arange(len(rows)) % FOLDS
-        then, now = np.empty_like(own.labels), np.empty_like(own.labels)
-        for left_out in range(FOLDS):
-            held = np.flatnonzero((fold == left_out) & (own.labels != NONE_INDEX))
-            if not len(held):
-                continue
+        # Of each performance what is said, and whether surely enough.
+        then, now = (np.empty((len(own), 2), dtype=np.int64) for _ in range(2))
+        for left_out in np.unique(fold):
+            held = np.flatnonzero(fold == left_out)
             part = self._learned(seen, np.flatnonzero(fold[number] != left_out), len(own))
             then[held], now[held] = (
-                network.answers(seen.rows(held).features)[0].argmax(1).numpy()
-                for network in (self._base, part)
+                self._said(network, seen.rows(held)) for network in (self._base, part)
             )
         meant = own.labels != NONE_INDEX
-        truth, then, now = own.labels[meant], then[meant], now[meant]
-        before, after = weighted_f1(truth, then), weighted_f1(truth, now)
-        if (now == truth).sum() <= (then == truth).sum():
-            return Learned(self._fitted, before, after, of_use=False)
-        network = self._learned(seen, np.arange(len(number)), len(own))
-        return Learned(replace(self._fitted, network=network), before, after, of_use=True)
+        before, after = (weighted_f1(own.labels[meant], said[meant, 0]) for said in (then, now))
+        right = [said[:, 0] == own.labels for said in (then, now)]
+        of_use = bool(right[1].sum() > right[0].sum())
+        fitted = self._fitted
+        if of_use:
+            network = self._learned(seen, np.arange(len(number)), len(own))
+            fitted = replace(fitted, network=network)
+        sure = (now if of_use else then)[:, 1] > 0
+        given_right = int((sure & right[of_use]).sum())
+        return Learned(fitted, before, after, of_use, int(sure.sum()), given_right)
+
+    def _said(self, network: Network, windows: _Seen) -> IntArray:
+        """The likeliest primitive of each window, and whether that is a sure answer, (n, 2)."""
+        logits, logit = network.answers(windows.features)
+        scale, shift = self._fitted.platt
+        scaling = torch.tensor(self._fitted.scaling)
+        likeliest = torch.softmax(scaled(logits, windows.lengths, scaling), 1).max(1)
+        confidence = likeliest.values * torch.sigmoid(logit * scale + shift)
+        sure = confidence >= self._fitted.confidence_min
+        return torch.stack([likeliest.indices, sure.long()], 1).numpy()
 
     def _learned(self, own: _Seen, rows: IntArray, whole: int) -> Network:
         """A network fitted to some of a person's windows, of which the first are whole ones."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from common.sticks import DEAD_BAND
 from services.classifier.model import SHORTEST_SAMPLES
-from training.adaptation import Adaptation
+from training.adaptation import Adaptation, Learned
 from training.dataset.primitive import Primitive
 from training.export import export, load, save
 from training.labels import PRIMITIVES
@@ -31,18 +31,14 @@ class Finetuned:
         sha256: of it.
         operator: who.
         performances: that it was adapted to.
-        before: F1 on them by the model it began with.
-        after: F1 on those left out of each of three adaptations to the others.
-        of_use: whether more were named right; otherwise the file is the model it began with.
+        learned: what they came to; if nothing, the file is the model it began with.
     """
 
     path: Path
     sha256: str
     operator: str
     performances: int
-    before: float
-    after: float
-    of_use: bool
+    learned: Learned
 
 
 def finetune(
@@ -85,7 +81,7 @@ def finetune(
     path = out / model.name
     sha256 = export(learned.fitted, PRIMITIVES, model.stem, path)
     save(learned.fitted, path.with_suffix(".pt"))
-    return Finetuned(path, sha256, who, len(own), learned.before, learned.after, learned.of_use)
+    return Finetuned(path, sha256, who, len(own), learned)
 
 
 def of_operator(

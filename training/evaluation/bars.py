@@ -120,9 +120,9 @@ def _calibrated(results: Results) -> list[Bar]:
             _above(found.mean, CALIBRATED_F1, ahead),
         ),
         Bar(
-            "arcs and sines taken for each other",
-            f"<= {ARC_SINE:.0%}",
-            f"{swapped.text(1, 100)} %",
+            "arcs and sines taken for each other, %",
+            f"<= {100 * ARC_SINE:g}",
+            swapped.text(1, 100),
             _best(results, _swapped, 1, 100, least=True)[0],
             at_most(100.0 * swapped.mean, 100.0 * ARC_SINE, 1),
         ),

@@ -92,6 +92,21 @@ def test_who_gains_nothing_keeps_the_network(
     assert learned.after == learned.before
 
 
+def test_sure_answers_to_what_is_left_out_are_counted_as_the_model_would_give_them(
+    fitted: Fitted, others: Examples, ana: list[Primitive], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(adapting, "LEARNING_RATE", 0.0)
+    own = examples_of(ana)
+    probabilities, meant = fitted.answers(seen_after(own, None))
+    confidence = meant * probabilities.max(axis=1)
+    least = float(np.sort(confidence)[7])
+    right = (probabilities.argmax(axis=1) == own.labels)[confidence >= least]
+    learned = Adaptation(replace(fitted, confidence_min=least), others, 2).to(own)
+    assert (learned.given, learned.given_right) == (len(own) - 7, right.sum())
+    certain = Adaptation(replace(fitted, confidence_min=1.1), others, 2).to(own)
+    assert (certain.given, certain.given_right) == (0, 0)
+
+
 class _Recorder:
     """Stands for an adaptation; keeps what it was shown."""
 
@@ -105,7 +120,7 @@ class _Recorder:
     def to(self, own: Examples) -> Learned:
         _Recorder.shown.append(own)
         of_use = len(_Recorder.shown) > 1
-        return Learned(self._adapted if of_use else self._fitted, 0.0, 1.0, of_use)
+        return Learned(self._adapted if of_use else self._fitted, 0.0, 1.0, of_use, 0, 0)
 
 
 def test_the_study_judges_on_performances_of_the_same_person_that_were_not_shown(
@@ -178,7 +193,9 @@ def test_the_command_writes_a_model_of_its_own(
     save_set(own, ana)
     command = ["train", "--finetune", str(own), "--model", str(base)]
     assert main([*command, "--out", str(tmp_path / "ana")]) == 0
-    assert "20 performances by ana" in capsys.readouterr().out
+    told = " ".join(capsys.readouterr().out.split())
+    assert "20 performances by ana" in told
+    assert "of 20 are answered surely enough to be suggested" in told
     assert OnnxModel(tmp_path / "ana" / "intent.onnx").labels == PRIMITIVES
     assert (tmp_path / "ana" / "intent.pt").exists()
 
