@@ -171,7 +171,7 @@ def newest_motion(sticks: Array | Array32, rate_hz: float) -> slice:
 
     From its first push to its last; empty if there is none.
     """
-    pushes = np.flatnonzero(np.abs(sticks[:, :3]).max(axis=1) > DEAD_BAND)
+    pushes = np.flatnonzero((np.abs(sticks[:, :3]) > DEAD_BAND).any(axis=1))
     if len(pushes) == 0:
         return slice(0, 0)
     pauses = np.flatnonzero(np.diff(pushes) > REST_S * rate_hz)
