@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -47,6 +47,14 @@ def _variables_of(environment: Mapping[str, str], service: str) -> dict[str, str
         for name, value in environment.items()
         if name.startswith(prefix)
     }
+
+
+def _choices_of(config_type: type, key: str) -> str:
+    """What a field takes, if that can be counted."""
+    kind = get_type_hints(config_type)[key]
+    choices = ("true", "false") if kind is bool else get_args(kind)
+    is_choice = kind is bool or get_origin(kind) is Literal
+    return f"; use {', '.join(map(str, choices))}" if is_choice else ""
 
 
 def load(
@@ -94,7 +102,8 @@ def load(
                 if isinstance(number := getattr(checked, key), float) and not isfinite(number):
                     raise ValueError(f"{number} is no number to work with")
             except (msgspec.ValidationError, ValueError) as error:
-                raise ConfigError(f"{service}: {origin} sets {key!r}: {error}") from None
+                text = f"{error}{_choices_of(config_type, key)}"
+                raise ConfigError(f"{service}: {origin} sets {key!r}: {text}") from None
             values[key] = value
     try:
         return msgspec.convert(values, config_type, strict=False)

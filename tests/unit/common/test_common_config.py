@@ -80,6 +80,12 @@ def test_a_bad_value_is_an_error_that_names_key_and_source(name: str, value: str
         load(Example, "sim", environment={f"AUTOCOMPLETE_SIM_{name}": value})
 
 
+@pytest.mark.parametrize(("name", "allowed"), [("mode", "slow, fast"), ("noisy", "true, false")])
+def test_what_can_be_counted_is_named_with_the_error(name: str, allowed: str) -> None:
+    with pytest.raises(ConfigError, match=f"{name}.*; use {allowed}$"):
+        load(Example, "sim", environment={}, flags={name: "maybe"})
+
+
 def test_a_bad_value_is_blamed_on_its_source_though_a_better_one_wins(tmp_path: Path) -> None:
     file = write(tmp_path, "[sim]\nrate_hz = -1\n")
     with pytest.raises(ConfigError, match=r"system\.toml sets 'rate_hz'.*more than 0"):

@@ -3,14 +3,17 @@
 import math
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 import worlds
 from common.messages import ResetRequest
 from services.sim.build import ARDRONE
+from services.sim.cameras import Shot, cameras_of
 from services.sim.config import Config
 from services.sim.core import STEP_S, ResetError, Simulation
+from services.sim.renderer import GlRenderer, NoOpenGlError
 from services.sim.stage import Stage
 
 
@@ -42,6 +45,28 @@ def test_what_stands_in_it_is_what_pybullet_has(name: str) -> None:
     meant = {(b.shape, b.texture, *np.round(b.size_m + b.position_m, 4)) for b in world.bodies}
     stage.close()
     assert seen == meant
+
+
+def test_below_every_path_there_are_corners_in_all_parts_of_the_picture() -> None:
+    try:
+        renderer = GlRenderer()
+    except NoOpenGlError as error:
+        pytest.skip(f"no OpenGL here: {error}")
+    down = cameras_of(Config())[1]
+    for name in worlds.names():
+        world = worlds.load(name)
+        stage = Stage(world, STEP_S)
+        renderer.load(stage.scene())
+        stage.close()
+        path = world.ideal_path_m if len(world.ideal_path_m) else np.asarray([(0.0, 0.0, 1.0)])
+        for place in path[:: len(path) // 4 + 1]:
+            shot = Shot("camera/down", 0, tuple(place.tolist()), (0.0, 0.0, 0.149, 0.989))
+            grey = cv2.cvtColor(renderer.draw(down, shot), cv2.COLOR_BGR2GRAY)
+            corners = cv2.goodFeaturesToTrack(grey, 200, 0.01, 8)
+            assert len(corners) >= 60, (name, place)
+            quarters = set(map(tuple, (corners[:, 0] // (160, 120)).astype(int)))
+            assert len(quarters) == 4, (name, place)
+    renderer.close()
 
 
 def test_the_lap_around_the_gazebo_is_as_long_as_the_thesis_best() -> None:
