@@ -186,6 +186,8 @@ class Synthesizer:
         if track is None or len(track.points_m) * CELL_M < self._config.min_extent_m:
             moved_m = 0.0 if track is None else (len(track.points_m) - 1) * CELL_M
             raise RefusalError(f"{intent.label}: the vehicle moved only {moved_m:.1f} m")
+        if self._history.is_held(begin_ns, arrival_ns):
+            raise RefusalError(f"{intent.label}: the vehicle is still where it was held")
         if self._running is not None and not self._running.lasts(arrival_ns):
             self._running = None
 

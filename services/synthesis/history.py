@@ -23,6 +23,12 @@ VELOCITY_S = 0.6
 REST_MPS = 0.1
 REST_S = 1.0
 """A vehicle that makes less way than this speed would for this time has ended its motion."""
+HELD_S, HELD_LEAST_S = 6.0, 1.5
+HELD_M = 0.8
+"""A vehicle that stayed within this of its mean place for `HELD_S`, or as long as is known but at
+least the second time, was held there."""
+HELD_FACTOR, HELD_MORE_M = 2.0, 0.1
+"""Corrections take it no farther than this many times as far as it strayed before, and a little."""
 GAP_S = 0.5
 JUMP_M = 1.0
 JUMP_MPS = 10.0
@@ -86,6 +92,21 @@ class History:
             _velocity(time_s, position_m),
         )
 
+    def is_held(self, begin_ns: int, end_ns: int) -> bool:
+        """Whether a window's motion has not left the place that the vehicle was held at before.
+
+        Nobody's wind and thumbs are so still that a held vehicle goes nowhere, and corrections look
+        like short lines and arcs. What tells them is that they lead nowhere new.
+        """
+        if not self._poses or begin_ns - self._poses[0][0] < nanoseconds(HELD_LEAST_S):
+            return False
+        before_m = self._places_m(begin_ns - nanoseconds(HELD_S), begin_ns)
+        place_m = before_m.mean(axis=0)
+        strayed_m = float(np.linalg.norm(before_m - place_m, axis=1).max())
+        now_m = self._places_m(begin_ns, end_ns)
+        reached_m = float(np.linalg.norm(now_m - place_m, axis=1).max(initial=0.0))
+        return strayed_m <= HELD_M and reached_m <= HELD_FACTOR * strayed_m + HELD_MORE_M
+
     def since_rest(self, end_ns: int) -> Array:
         """Points (N, 3) about `CELL_M` apart of the way flown since the vehicle last rested."""
         chosen = [(ns, pose) for ns, pose in self._poses if ns <= end_ns]
@@ -98,6 +119,11 @@ class History:
         first = int(np.flatnonzero(resting)[-1]) if resting.any() else 0
         way_m = way_m[first:] - way_m[first]
         return _means(position_m[first:], np.floor(way_m / CELL_M))
+
+    def _places_m(self, begin_ns: int, end_ns: int) -> Array:
+        """Positions (N, 3) that arrived within a time."""
+        places = [pose.position for ns, pose in self._poses if begin_ns <= ns <= end_ns]
+        return np.array(places).reshape(-1, 3)
 
 
 def _motion(chosen: list[tuple[int, Pose]]) -> tuple[Array, Array, Array]:

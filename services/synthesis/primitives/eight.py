@@ -40,7 +40,10 @@ SAME_SHARE = 0.25
 """Eights that differ by this share are the same to who flies them by hand."""
 _PHASES = np.linspace(-math.pi, math.pi, 240, endpoint=False)
 _AGAINST_M = 1e3
-"""Added to the distance of places where the eight leads another way than the vehicle flew."""
+"""Added to the distance of places where the eight leads against the way the vehicle flew."""
+_ASIDE_SHARE = 0.25
+"""Of half the width, added where it leads at a right angle to it: both ways lead on from the
+crossing, and the nearer one may be the wrong one by a hair."""
 
 
 @dataclass(frozen=True)
@@ -219,7 +222,10 @@ def _lap_m(eight: Array) -> float:
 def _nearest(eight: Array, xy: Array, travel: Array) -> Array:
     """Phases (N,) of the places nearest to points (N, 2) that lead the way of travel (N, 2)."""
     gaps = np.linalg.norm(xy[:, None] - _on(eight, _PHASES)[None], axis=2)
-    gaps += np.where(travel @ _tangent(eight, _PHASES).T > 0.0, 0.0, _AGAINST_M)
+    ways = _tangent(eight, _PHASES)
+    lengths = np.linalg.norm(travel, axis=1)[:, None] * np.linalg.norm(ways, axis=1)
+    agree = travel @ ways.T / np.maximum(lengths, 1e-12)
+    gaps += np.where(agree > 0.0, _ASIDE_SHARE * abs(eight[4]) * (1.0 - agree), _AGAINST_M)
     phases = _PHASES[np.argmin(gaps, axis=1)]
     tangent = _tangent(eight, phases)
     along = np.sum((xy - _on(eight, phases)) * tangent, axis=1) / np.sum(tangent**2, axis=1)

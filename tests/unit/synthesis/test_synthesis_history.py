@@ -79,3 +79,47 @@ def test_poses_that_arrive_together_are_no_trouble():
     stamped = [(message, S) for message, _ in poses(lambda t: np.array([t, 0.0, 1.0]), 1.0)]
     track = history_of(stamped).track(0, END_NS)
     assert np.all(np.isfinite(track.points_m))
+
+
+def held(t):
+    """Corrections to and fro within about 0.3 m."""
+    return np.array([0.3 * np.sin(1.1 * t), 0.25 * np.cos(0.7 * t), 1.0])
+
+
+@pytest.mark.parametrize("before_s", [4.0, 12.0])
+def test_corrections_about_a_place_leave_the_vehicle_held_there(before_s):
+    stamped = poses(held, before_s + 3.0)
+    assert history_of(stamped).is_held(stamped[-1][1] - 3 * S, stamped[-1][1])
+
+
+def test_a_motion_that_leads_away_is_free_as_soon_as_it_is_out_of_the_place():
+    def where(t):
+        return held(t) if t < 8.0 else held(8.0) + np.array([0.8 * (t - 8.0), 0.0, 0.0])
+
+    begin_ns, free_after_s = 9 * S, []
+    for after_s in np.arange(0.1, 2.0, 0.1):
+        stamped = poses(where, 8.0 + after_s)
+        if not history_of(stamped).is_held(begin_ns, stamped[-1][1]):
+            free_after_s.append(after_s)
+    assert 0.3 < min(free_after_s) < 1.0
+    assert len(free_after_s) == round((2.0 - min(free_after_s)) / 0.1), "once free, always free"
+
+
+def test_a_motion_from_standing_still_is_free_at_once():
+    def where(t):
+        return np.array([max(0.0, 0.8 * (t - 5.0)), 0.0, 1.0])
+
+    stamped = poses(where, 5.3)
+    assert not history_of(stamped).is_held(6 * S, stamped[-1][1])
+
+
+@pytest.mark.parametrize("speed_mps", [0.4, 1.0])
+def test_a_vehicle_on_its_way_is_not_held(speed_mps):
+    stamped = poses(lambda t: np.array([speed_mps * t, 0.0, 1.0]), 9.0)
+    assert not history_of(stamped).is_held(stamped[-1][1] - 2 * S, stamped[-1][1])
+
+
+def test_nobody_knows_of_a_place_before_the_first_poses():
+    stamped = poses(held, 3.0)
+    assert not history_of(stamped).is_held(2 * S, stamped[-1][1])
+    assert not History().is_held(0, S)
