@@ -81,7 +81,9 @@ def _lengths(groups: "Sequence[Group]") -> Table:
 def _counts(kind: str, groups: "Sequence[Group]") -> Table:
     hidden = len(groups) - GROUPS_SHOWN
     more = f"and {hidden} more" if hidden > 0 else None
-    table = Table(kind, box=None, padding=(0, 2, 0, 0), caption=more)
+    table = Table(box=None, padding=(0, 2, 0, 0), caption=more)
+    # Whole names, however long: --operator takes no others.
+    table.add_column(kind, overflow="fold")
     for name in ("n", *CLASSES, "operators", "samples", "Hz"):
         table.add_column(name, justify="right")
     for group in groups[:GROUPS_SHOWN]:

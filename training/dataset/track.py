@@ -85,7 +85,7 @@ class TrackBuilder:
             self.reject(where, f"a stick of {worst:g} is beyond [-1, 1]; the row is left out")
             return
         if self._times_s and time_s <= self._times_s[-1]:
-            before = f"time {time_s:.9g} s is not after {self._times_s[-1]:.9g} s"
+            before = f"time {time_s:.3f} s is not after {self._times_s[-1]:.3f} s"
             if time_s > self._times_s[-1] - LATE_S:
                 self.reject(where, f"{before}; the row is left out")
                 return

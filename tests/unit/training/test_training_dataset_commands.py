@@ -139,6 +139,9 @@ def test_stats_count_and_draw(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert ["arc", "1", "1", "150", "/", "150", "/", "150"] in [line[:8] for line in lines]
     assert ["ben", "1", "0", "0", "1", "0", "0", "1", "150", "50"] in lines
     assert figure.read_bytes().startswith(b"\x89PNG")
+    save(path, [primitive(operator="wide0-pilot-yaw-nervous-0012")])
+    assert dataset("stats", path) == 0
+    assert "…" not in capsys.readouterr().out
     save(path, [])
     assert dataset("stats", path) == 1
     assert dataset("stats", figure) == 1
