@@ -10,8 +10,8 @@ from common.frames import Array
 from services.sim import meshes, shaders
 from worlds import Body, Texture
 
-SEE_THROUGH = frozenset({"fence"})
-"""Textures with holes; they are drawn last."""
+NET: Texture = "fence"
+"""It has holes, and is drawn last."""
 MOST_FIGURES = 256
 """Bodies of vehicles of one shape that are drawn at once."""
 _COLUMNS = 11
@@ -31,9 +31,10 @@ class Bodies:
     def __init__(self, gl: Any, layers: dict[Texture, int], extent_m: Array) -> None:
         self._gl = gl
         self._layers = layers
-        self.program = gl.program(shaders.BODY_VERTEX, shaders.BODY_FRAGMENT)
+        self._opaque = gl.program(shaders.BODY_VERTEX, shaders.BODY_FRAGMENT)
+        self._net = gl.program(shaders.BODY_VERTEX, shaders.NET_FRAGMENT)
         self._shadow_program = gl.program(shaders.SHADOW_VERTEX, shaders.SHADOW_FRAGMENT)
-        for program in (self.program, self._shadow_program):
+        for program in (*self.programs, self._shadow_program):
             program["extent"] = [tuple(each) for each in extent_m]
         self._meshes = {
             "box": gl.buffer(meshes.box().tobytes()),
@@ -43,8 +44,13 @@ class Bodies:
         self._figures = {}
         for shape in self._meshes:
             buffer = gl.buffer(reserve=MOST_FIGURES * _COLUMNS * 4, dynamic=True)
-            self._figures[shape] = (buffer, self._drawn(shape, buffer))
+            self._figures[shape] = (buffer, self._drawn(self._opaque, shape, buffer))
         self._scene_objects: list[Any] = []
+
+    @property
+    def programs(self) -> tuple[Any, Any]:
+        """What draws them."""
+        return self._opaque, self._net
 
     def load(self, bodies: Sequence[Body]) -> None:
         """Draw these from now on."""
@@ -52,21 +58,22 @@ class Bodies:
             each.release()
         self._scene_objects = []
         self._flocks: list[_Flock] = []
-        self._panes: list[_Flock] = []
+        self._nets: list[_Flock] = []
         tables = [np.empty((0, _COLUMNS), "f4")]
         begin = 0
-        for flocks, is_pane in ((self._flocks, False), (self._panes, True)):
+        for flocks, program in ((self._flocks, self._opaque), (self._nets, self._net)):
             for shape in self._meshes:
                 alike = [
                     body
                     for body in bodies
-                    if body.shape == shape and (body.texture in SEE_THROUGH) == is_pane
+                    if body.shape == shape and (body.texture == NET) == (flocks is self._nets)
                 ]
                 if not alike:
                     continue
                 table = self._table(alike)
                 buffer = self._gl.buffer(table.tobytes(), dynamic=True)
-                drawn, shadow = self._drawn(shape, buffer), self._shadowing(shape, buffer)
+                drawn = self._drawn(program, shape, buffer)
+                shadow = self._shadowing(shape, buffer)
                 rows = slice(begin, begin + len(table))
                 flocks.append(_Flock(table, rows, buffer, drawn, shadow))
                 self._scene_objects += [drawn, shadow, buffer]
@@ -79,7 +86,7 @@ class Bodies:
     def cast_shadows(self, window: Array) -> None:
         """Draw the shadows into a window of the ground; the textures are in use at place 0."""
         self._shadow_program["window"] = tuple(window)
-        for flock in self._flocks + self._panes:
+        for flock in self._flocks + self._nets:
             flock.shadow.render(instances=len(flock.table))
 
     def look(self, eye: Array, from_world: Array) -> Array:
@@ -108,10 +115,10 @@ class Bodies:
                 buffer.write(self._table(some).tobytes())
                 vertices.render(instances=len(some))
 
-    def draw_panes(self, away_m: Array) -> None:
-        """Draw what has holes, far to near, so that nets are seen through nets."""
-        for pane in self._panes:
-            pane.draw(away_m, -1)
+    def draw_nets(self, away_m: Array) -> None:
+        """Draw the nets, far to near, so that they are seen through each other."""
+        for net in self._nets:
+            net.draw(away_m, -1)
 
     def _table(self, bodies: Sequence[Body]) -> Array:
         """One row a body: place, turn, size, layer."""
@@ -121,10 +128,10 @@ class Bodies:
         ]
         return np.asarray(rows, "f4").reshape(-1, _COLUMNS)
 
-    def _drawn(self, shape: str, table: Any) -> Any:
+    def _drawn(self, program: Any, shape: str, table: Any) -> Any:
         names = ("in_position", "in_normal", "in_uv", "in_across", "in_up")
         return self._gl.vertex_array(
-            self.program,
+            program,
             [
                 (self._meshes[shape], "3f 3f 2f 3f 3f", *names),
                 (table, _LAYOUT, "at", "turn", "size", "layer"),

@@ -69,7 +69,7 @@ class GlRenderer:
         self._sky_texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._sky_texture.repeat_y = False
         self._programs = (
-            self._bodies.program,
+            *self._bodies.programs,
             self._ground.textured,
             self._ground.painted,
             self._sky_program,
@@ -113,9 +113,8 @@ class GlRenderer:
         gl.depth_func = "<="
         self._sky.render()
         gl.depth_func = "<"
-        self._textures.use(0)
         gl.enable(moderngl.CULL_FACE | moderngl.BLEND)
-        self._bodies.draw_panes(away_m)
+        self._bodies.draw_nets(away_m)
         self._finish()
         return target.read()
 

@@ -5,6 +5,8 @@ texture of a layer whose repetition measures `extent` m (0: fitted to the face).
 BGR, the order that OpenCV encodes.
 """
 
+from services.sim.textures import NET_COLOURS, NET_MESHES, NET_TAPE, NET_THREAD
+
 SUN = (-0.42, -0.33, 0.845)
 """Towards it, world."""
 MAX_LAYERS = 16
@@ -59,6 +61,24 @@ out vec4 bgra;
 void main() {{
     vec4 texel = texture(textures, uv);
     bgra = vec4(hazy(texel.rgb * light).bgr, texel.a);
+}}
+"""
+
+# By rule, antialiased: to fetch a texel would take twice as long.
+NET_FRAGMENT = f"""{_HEAD}{_HAZE}
+in vec3 uv; in float light;
+out vec4 bgra;
+void main() {{
+    vec2 at = uv.xy * vec2{NET_MESHES};
+    vec2 from_thread = abs(fract(at + 0.5) - 0.5);
+    vec2 pixel = fwidth(at);
+    vec2 covered = clamp(({NET_THREAD / 2} - from_thread) / pixel + 0.5, 0.0, 1.0);
+    // Of threads narrower than a pixel only their mean is seen.
+    covered = mix(covered, vec2({NET_THREAD}), clamp(2.0 * pixel - 0.3, 0.0, 1.0));
+    vec2 gap = 1.0 - covered;
+    float tape = step({1.0 - NET_TAPE}, uv.y);
+    vec3 colour = mix(vec3{NET_COLOURS[0]}, vec3{NET_COLOURS[1]}, tape);
+    bgra = vec4(hazy(colour * light).bgr, max(tape, 1.0 - gap.x * gap.y));
 }}
 """
 

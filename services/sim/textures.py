@@ -17,6 +17,14 @@ PIXELS = 512
 CANVAS = 1024
 """Pixels that are painted."""
 _SEED = 20210
+NET_MESHES = (24, 11)
+"""Of a net, across a repetition and upwards; about 10 cm each."""
+NET_THREAD = 0.12
+"""How much of a mesh it covers."""
+NET_TAPE = 0.06
+"""How much of a net's height it covers, on top."""
+NET_COLOURS = ((0.16, 0.18, 0.20), (0.96, 0.45, 0.05))
+"""Of thread and tape."""
 
 Picture = NDArray[np.uint8]
 _Field = NDArray[np.float32]
@@ -209,20 +217,15 @@ def _post(generator: np.random.Generator) -> Picture:
 
 
 def _fence(generator: np.random.Generator) -> Picture:
-    """A net 1.1 m high with a tape on top."""
+    """A net with a tape on top, for its shadow; what is seen of it OpenGL draws by rule."""
     colour = np.empty((CANVAS, CANVAS, 3), np.float32)
-    colour[:] = (0.16, 0.18, 0.20)
-    alpha = np.zeros((CANVAS, CANVAS), np.float32)
-    # Meshes of about 10 cm.
-    for at in range(0, CANVAS, 90):
-        alpha[at : at + 10, :] = 1.0
-    for at in range(0, CANVAS, 42):
-        alpha[:, at : at + 5] = 1.0
-    tape = slice(0, 62)
-    alpha[tape] = 1.0
-    colour[tape] = (0.96, 0.45, 0.05)
-    colour *= (0.85 + 0.3 * noise(generator, 16, 5))[..., None]
-    return _picture(colour, alpha)
+    colour[:] = NET_COLOURS[0]
+    steps = np.arange(CANVAS) / CANVAS
+    across, up = (steps * meshes % 1.0 < NET_THREAD for meshes in NET_MESHES)
+    tape = steps < NET_TAPE
+    colour[tape] = NET_COLOURS[1]
+    alpha = up[:, None] | across | tape[:, None]
+    return _picture(colour, alpha.astype(np.float32))
 
 
 def _board(generator: np.random.Generator) -> Picture:
