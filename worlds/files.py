@@ -6,7 +6,7 @@ Lengths are in m, angles in degrees.
 import itertools
 import math
 from pathlib import Path as FilePath
-from typing import Annotated
+from typing import Annotated, get_args
 
 import msgspec
 import numpy as np
@@ -24,6 +24,7 @@ MAX_BODIES = 5000
 _Coordinate = Annotated[float, Meta(ge=-1e4, le=1e4)]
 _Point = tuple[_Coordinate, _Coordinate, _Coordinate]
 _Length = Annotated[float, Meta(gt=0.0, le=1000.0)]
+_Angle = Annotated[float, Meta(ge=-3600.0, le=3600.0)]
 _Count = Annotated[int, Meta(ge=1, le=1000)]
 
 _SHAPED_BY: dict[Primitive, tuple[str, ...]] = {
@@ -32,6 +33,9 @@ _SHAPED_BY: dict[Primitive, tuple[str, ...]] = {
     "helix": ("radius_m", "sweep_deg", "climb_m"),
     "sine": ("length_m", "amplitude_m", "wavelength_m"),
 }
+
+
+_CHOICES = {"texture": Texture, "ground": Texture, "shape": Shape, "primitive": Primitive}
 
 
 class WorldError(ValueError):
@@ -44,14 +48,14 @@ class _Read(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 class _Start(_Read, frozen=True, kw_only=True):
     position_m: _Point = (0.0, 0.0, 0.0)
-    yaw_deg: float = 0.0
+    yaw_deg: _Angle = 0.0
 
 
 class _Segment(_Read, frozen=True, kw_only=True):
     primitive: Primitive
     length_m: _Length | None = None
     radius_m: _Length | None = None
-    sweep_deg: Annotated[float, Meta(ge=-3600.0, le=3600.0)] | None = None
+    sweep_deg: _Angle | None = None
     climb_m: Annotated[float, Meta(ge=-1000.0, le=1000.0)] | None = None
     amplitude_m: _Length | None = None
     wavelength_m: _Length | None = None
@@ -72,7 +76,7 @@ class _Segment(_Read, frozen=True, kw_only=True):
 
 class _IdealPath(_Read, frozen=True, kw_only=True):
     start_m: _Point
-    yaw_deg: float = 0.0
+    yaw_deg: _Angle = 0.0
     closed: bool = False
     segments: Annotated[list[_Segment], Meta(min_length=1)]
 
@@ -104,9 +108,9 @@ class _Body(_Read, frozen=True, kw_only=True):
     shape: Shape
     size_m: tuple[_Length, _Length, _Length]
     position_m: _Point
-    roll_deg: float = 0.0
-    pitch_deg: float = 0.0
-    yaw_deg: float = 0.0
+    roll_deg: _Angle = 0.0
+    pitch_deg: _Angle = 0.0
+    yaw_deg: _Angle = 0.0
     texture: Texture
     rows: list[_Row] = []
     ring: _Ring | None = None
@@ -160,7 +164,7 @@ def load_file(path: FilePath, name: str | None = None) -> World:
     try:
         read = msgspec.yaml.decode(path.read_bytes(), type=_File)
     except (OSError, UnicodeDecodeError, msgspec.DecodeError) as error:
-        raise WorldError(f"{path}: {error}") from None
+        raise WorldError(f"{path}: {_line_of(error)}") from None
     if read.lane is not None and read.ideal_path is None:
         raise WorldError(f"{path}: `lane` needs an `ideal_path` to lie along")
     bodies = [body for each in read.bodies for body in _bodies(each)]
@@ -190,6 +194,15 @@ def load_file(path: FilePath, name: str | None = None) -> World:
         strips=tuple(strips),
         ground=read.ground,
     )
+
+
+def _line_of(error: Exception) -> str:
+    """What is wrong with a file, in one line."""
+    text = " ".join(str(error).split())
+    if text.startswith("Invalid enum value"):
+        field = text.rstrip("`").rpartition(".")[2]
+        text = f"{text}; use {', '.join(get_args(_CHOICES[field]))}"
+    return text
 
 
 def _path(read: _IdealPath) -> Path:

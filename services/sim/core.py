@@ -182,12 +182,14 @@ class Simulation:
         try:
             for actor in self.actors:
                 hull = stage.add(build if actor is asked else actor.plant.build)
-                place = _start_place(world, hull, actor)
-                if actor is asked:
-                    place = _asked(request, *place)
-                    hull.place(*place)
-                    if hull.overlaps():
-                        raise _OCCUPIED
+                if actor is asked and request.position is not None:
+                    place = _asked(request, world.start_position_m, world.start_yaw_rad)
+                else:
+                    place = _start_place(world, hull, actor)
+                    place = _asked(request, *place) if actor is asked else place
+                hull.place(*place)
+                if hull.overlaps():
+                    raise _OCCUPIED
                 cast.append((hull, place))
         except ResetError:
             stage.close()
@@ -229,11 +231,13 @@ def _start_place(world: World, hull: Hull, actor: Actor) -> tuple[Vector3, float
     The hull is put there. Those before it are at their places already.
 
     Raises:
-        ResetError: if there is no room for another one.
+        ResetError: if there is no room for it.
     """
     (x, y, z), yaw_rad = world.start_position_m, world.start_yaw_rad
     if actor.index == 0:
         hull.place((x, y, z), yaw_rad)
+        if hull.overlaps():
+            raise ResetError("world", f"{world.name}: something stands where it starts: `start`")
         return (x, y, z), yaw_rad
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     for row in range(_ROWS):

@@ -206,7 +206,10 @@ def test_sampling_follows_an_arc_of_either_hand(tmp_path: Path) -> None:
             "bodies: [{shape: sphere, size_m: [1, 1, 2], position_m: [0, 0, 0], texture: crate}]",
             "size_m",
         ),
-        (": : [", ""),
+        (": : [", "line 1, column"),
+        ("description: a\nbodies: [1", "line 2, column"),
+        ("description: a\nground: snow", "use asphalt, grass, concrete"),
+        ("description: a\nstart: {yaw_deg: .nan}", "yaw_deg"),
     ],
 )
 def test_a_wrong_file_is_refused_with_its_name_and_the_field(
@@ -218,6 +221,28 @@ def test_a_wrong_file_is_refused_with_its_name_and_the_field(
         worlds.load_file(file)
     assert str(file) in str(caught.value)
     assert field in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_world_whose_start_is_taken_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "full.yaml"
+    file.write_text(
+        "description: a crate where it starts\n"
+        "bodies: [{shape: box, size_m: [1, 1, 1], position_m: [0, 0, 0.2], texture: crate}]\n"
+    )
+    with pytest.raises(ResetError, match=r"full\.yaml: something stands.*`start`"):
+        Simulation(Config(world=str(file)))
+    # Who is told another place may go there.
+    config = Config(world="empty")
+    simulation = Simulation(config)
+    simulation.worlds = lambda: ["empty", str(file)]  # type: ignore[method-assign]
+    with pytest.raises(ResetError, match="`start`"):
+        simulation.reset(ResetRequest(world=str(file)))
+    assert simulation.status().world == "empty"
+    assert simulation.reset(ResetRequest(world=str(file), position=(3.0, 0.0, 0.0))).world == str(
+        file
+    )
+    simulation.close()
 
 
 def test_an_unknown_world_is_refused_with_those_there_are() -> None:
