@@ -24,11 +24,11 @@ Format = Literal["joy", "csv", "vectors", "mcap", "npz"]
 Segmentation = Literal["ours", "thesis"]
 
 BUTTONS = {
-    **dict(zip(("triangle", "circle", "cross", "square"), PRIMITIVES, strict=True)),
-    **dict(zip(("y", "b", "a", "x"), PRIMITIVES, strict=True)),
-    **dict(zip(("face1", "face2", "face3", "face4"), PRIMITIVES, strict=True)),
+    **dict(zip(("triangle", "circle", "cross", "square"), PRIMITIVES, strict=False)),
+    **dict(zip(("y", "b", "a", "x"), PRIMITIVES, strict=False)),
+    **dict(zip(("face1", "face2", "face3", "face4"), PRIMITIVES, strict=False)),
 }
-"""Face buttons clockwise from the top are the four primitives, on each family of pads."""
+"""Face buttons clockwise from the top are the first four primitives, on each family of pads."""
 
 
 @dataclass(frozen=True)
