@@ -56,6 +56,7 @@ def test_more_primitives_than_the_four_are_welcome(tmp_path: Path) -> None:
         ({"time_axis": 200}, "fails on"),
         ({"classes": 5}, "shapes"),
         ({"softmax": False}, "no probabilities"),
+        ({"softmax": False, "logits": (-0.1, 0.6, 0.0, 0.0)}, "no probabilities"),
         ({"meant_value": 1.5}, "no probabilities"),
         ({"meant_of_rest": float("nan")}, "no probabilities"),
         ({"logits": (float("nan"), 0.0, 0.0, 0.0)}, "no probabilities"),

@@ -330,6 +330,35 @@ def test_run_announces_serves_and_ends_when_told(world: World) -> None:
     assert closed == ["last declared", "first declared"]
 
 
+def test_a_service_sleeps_until_something_comes(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = world.node("autopilot")
+    heard = threading.Event()
+    node.on("stick", lambda *_: heard.set())
+    looks = 0
+    spin = node.spin
+
+    def look() -> None:
+        nonlocal looks
+        looks += 1
+        spin()
+
+    monkeypatch.setattr(node, "spin", look)
+    stop = threading.Event()
+    runner = threading.Thread(target=node.run, args=(stop,))
+    runner.start()
+    try:
+        stop.wait(0.3)
+        world.put("stick", stick())
+        assert heard.wait(0.5), "the clock stands still, so only the stick can wake it"
+    finally:
+        stop.set()
+        node.wake()
+        runner.join(5.0)
+    assert looks <= 3
+
+
 def test_every_topic_of_the_table_can_be_read(world: World) -> None:
     node = world.node("recorder")
     for name in TOPICS:
