@@ -12,8 +12,6 @@ from common.frames import Array
 from worlds import Strip
 
 _CYLINDER_SIDES, _SPHERE_RINGS = 12, 10
-_RIM_RAD = 1.2
-"""Below the horizon; from high up the ground ends before it."""
 
 
 def box() -> Array:
@@ -71,26 +69,6 @@ def sphere() -> Array:
 
     vertices = []
     for ring in range(_SPHERE_RINGS):
-        for side in range(sides):
-            a, b = point(ring, side), point(ring, side + 1)
-            c, d = point(ring + 1, side + 1), point(ring + 1, side)
-            vertices += [a, b, c, a, c, d]
-    return np.asarray(vertices, "f4")
-
-
-def dome() -> Array:
-    """The upper half of a sphere seen from inside, and its rim far down: position, uv."""
-    rings, sides = 12, 48
-
-    def point(ring: int, side: int) -> tuple[float, ...]:
-        rise = math.pi / 2.0 * ring / rings if ring >= 0 else -_RIM_RAD
-        turn = 2.0 * math.pi * side / sides
-        level = math.cos(rise)
-        v = 1.0 - max(ring, 0) / rings
-        return (level * math.cos(turn), level * math.sin(turn), math.sin(rise), side / sides, v)
-
-    vertices = []
-    for ring in range(-1, rings):
         for side in range(sides):
             a, b = point(ring, side), point(ring, side + 1)
             c, d = point(ring + 1, side + 1), point(ring + 1, side)

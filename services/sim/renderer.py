@@ -14,12 +14,13 @@ import numpy as np
 
 from common.camera import Lens
 from common.frames import Array, rotation_of
-from services.sim import meshes, shaders
+from services.sim import shaders
 from services.sim.bodies import Bodies
 from services.sim.cameras import Camera, Shot
 from services.sim.ground import Ground
+from services.sim.sky import Sky
 from services.sim.stage import Scene
-from services.sim.textures import PIXELS, Picture, paint, sky
+from services.sim.textures import PIXELS, Picture, paint
 from worlds import Texture
 
 FAR_M = 400.0
@@ -59,20 +60,12 @@ class GlRenderer:
         self._textures, extent_m = _textures_of(gl, layers)
         self._bodies = Bodies(gl, layers, extent_m)
         self._ground = Ground(gl, layers, extent_m)
-        self._sky_program = gl.program(shaders.SKY_VERTEX, shaders.SKY_FRAGMENT)
-        self._sky = gl.vertex_array(
-            self._sky_program,
-            [(gl.buffer(meshes.dome().tobytes()), "3f 2f", "in_position", "in_uv")],
-        )
-        picture = sky()
-        self._sky_texture = gl.texture(picture.shape[1::-1], 4, picture.tobytes())
-        self._sky_texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._sky_texture.repeat_y = False
+        self._sky = Sky(gl)
         self._programs = (
             *self._bodies.programs,
             self._ground.textured,
             self._ground.painted,
-            self._sky_program,
+            self._sky.program,
         )
         self._targets: dict[Lens, _Target] = {}
 
@@ -108,10 +101,8 @@ class GlRenderer:
         self._bodies.draw_opaque(away_m, figures)
         gl.disable(moderngl.CULL_FACE)
         self._ground.draw()
-        self._sky_program["eye"] = tuple(eye)
-        self._sky_texture.use(0)
         gl.depth_func = "<="
-        self._sky.render()
+        self._sky.draw(eye, from_world)
         gl.depth_func = "<"
         gl.enable(moderngl.CULL_FACE | moderngl.BLEND)
         self._bodies.draw_nets(away_m)

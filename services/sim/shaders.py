@@ -175,18 +175,21 @@ SKY_VERTEX = """
 #version 330
 uniform mat4 from_world;
 uniform vec3 eye;
-in vec3 in_position; in vec2 in_uv;
-out vec2 uv;
+uniform float slope;
+in vec3 in_position; in vec3 in_colour;
+out vec3 colour;
 void main() {
-    uv = in_uv;
+    colour = in_colour.bgr;
+    vec3 away = in_position;
+    // Its rim lies on the ground: what is hidden costs too.
+    if (away.z < 0.0) away.z *= slope;
     // As far as depth goes.
-    gl_Position = (from_world * vec4(eye + in_position * 100.0, 1.0)).xyww;
+    gl_Position = (from_world * vec4(eye + away * 100.0, 1.0)).xyww;
 }
 """
 SKY_FRAGMENT = """
 #version 330
-uniform sampler2D picture;
-in vec2 uv;
+in vec3 colour;
 out vec4 bgra;
-void main() { bgra = vec4(texture(picture, uv).bgr, 1.0); }
+void main() { bgra = vec4(colour, 1.0); }
 """

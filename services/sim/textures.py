@@ -326,30 +326,3 @@ def patches() -> Picture:
     """Seamless cloudy light and dark, (PIXELS, PIXELS, 1)."""
     field = noise(np.random.default_rng(_SEED), 16, 6)
     return np.asarray(cv2.resize(field, (PIXELS, PIXELS)) * 255.0, np.uint8)[..., None]
-
-
-def sky(generator: np.random.Generator | None = None) -> Picture:
-    """The sky as a (512, 2048, 4) picture: all round across, zenith on top, below it the horizon.
-
-    A ridge of hills stands on the horizon, the same after a full turn. Enlarged here, once, so
-    that a pixel needs no more than the nearest one.
-    """
-    generator = generator or np.random.default_rng(_SEED)
-    height, width = 256, 1024
-    up = np.linspace(1.0, 0.0, height, dtype=np.float32)[:, None, None]
-    zenith, horizon = np.asarray((0.22, 0.45, 0.78)), np.asarray((0.78, 0.87, 0.93))
-    colour = (horizon + (zenith - horizon) * up**0.55) * np.ones((1, width, 1))
-    # Clouds are drawn out along the horizon, as perspective has them.
-    clouds = cv2.resize(noise(generator, 8, 7)[:512], (width, height))
-    cover = np.clip((clouds - 0.55) * 3.2, 0.0, 1.0)[..., None] * np.clip(up * 6.0, 0.0, 1.0)
-    colour = colour * (1.0 - 0.85 * cover) + 0.85 * cover * np.asarray((1.0, 0.99, 0.97))
-    angle = np.linspace(0.0, 2.0 * np.pi, width, endpoint=False)
-    for base, tint in ((0.050, (0.55, 0.65, 0.72)), (0.030, (0.36, 0.48, 0.42))):
-        ridge = np.full(width, base)
-        for wave in range(3, 40):
-            ridge += base / wave**0.9 * 0.5 * np.sin(wave * angle + generator.uniform(0, 6.28))
-        below = up[:, :, 0] < np.maximum(ridge, 0.008)[None, :]
-        colour[below] = tint
-    small = np.asarray(np.clip(colour * 255.0, 0.0, 255.0), np.uint8)
-    large = cv2.resize(small, (2 * width, 2 * height), interpolation=cv2.INTER_LINEAR)
-    return np.asarray(cv2.cvtColor(large, cv2.COLOR_RGB2RGBA), np.uint8)
