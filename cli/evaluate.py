@@ -22,7 +22,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         " learned from, and writes tables and figures of all results in the folder. A result that"
         " is there and not stale is not found again: an evaluation that was stopped goes on where"
         " it was, and several with other --seeds may run side by side in one folder. A change of"
-        " the people, or of the code of a classifier, makes its results stale."
+        " the people, of what is asked, or of the code of a classifier makes its results stale."
     )
     parser.add_argument(
         "--out",

@@ -281,7 +281,8 @@ def _picture(table: Table, path: Path) -> str:
             cell.set_facecolor("#eef2f6")
         elif column == len(table.header) - 1:
             met = is_met(table.rows[row - 1][column])
-            cell.set_text_props(color="#006b4f" if met else "#a33c00", weight="bold")
+            colour = {True: "#006b4f", False: "#a33c00", None: "#666666"}[met]
+            cell.set_text_props(color=colour, weight="bold")
     _save(figure, path)
     return f"{table.title}. {table.caption}"
 
