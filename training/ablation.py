@@ -63,6 +63,7 @@ VARIANTS = (
     Variant("one softmax, no decisions", Architecture(decisions=False)),
     Variant("last state only, no pooling", Architecture(pooling=("last",))),
     Variant("half the width", HALF),
+    Variant("GRUs see twice the steps", Architecture(strides=(2, 2, 2, 1))),
     Variant("no noise on the features", Architecture(noise=0.0)),
     Variant("series are never absent", Architecture(absent=0.0)),
     Variant("whole primitives only, no cuts", cuts=False),

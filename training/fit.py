@@ -67,7 +67,7 @@ class Budget:
         return max(1, round(self.windows / examples))
 
 
-EVALUATION = Budget(windows=500_000)
+EVALUATION = Budget(windows=1_200_000)
 """For one fold of an evaluation."""
 
 

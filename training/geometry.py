@@ -7,6 +7,7 @@ all planes side by side, and means of products are one product of matrices.
 """
 
 import math
+from collections.abc import Mapping, Sequence
 
 import torch
 from torch import Tensor, nn
@@ -37,44 +38,117 @@ SHORT_WAY = 0.25
 """Added to ways, in steps of full stick, so that nothing is divided by 0."""
 RIDGE = 1e-6
 """Of a circle's normal equations, in squares of the way: a line's circle has a finite radius."""
-FLOORS = (0.02, 0.02, 1e-4, 1e-5, 1e-5, 1e-4, 1e-4)
-"""Added before a logarithm is taken: what is much smaller is noise, or a rounding error."""
-ONE, TIME, U, W, HEADING, Q, A, B, SPEED, RATE = range(10)
-"""Signals: 1, time as a share of the window, place from the mean place as a share of the way,
-heading from the mean heading, square of the distance from the mean place, from its mean, velocity,
-speed, rate of turn."""
-PRODUCTS = (
-    (U, U), (U, W), (W, W), (U, Q), (W, Q), (Q, Q), (U, B), (W, A), (ONE, A), (ONE, B),
-    (HEADING, HEADING), (SPEED, SPEED), (ONE, RATE), (TIME, RATE), (TIME, HEADING),
+FLOORS = (1e-4, 1e-5, 0.02, 0.02, 1e-5, 1e-4, 3e-3)
+"""Added before a logarithm is taken: what is much smaller is noise, a rounding error, or steadier
+than a hand."""
+SIGNALS = ("one", "time", "u", "w", "heading", "q", "a", "b", "speed", "rate")
+"""1, time as a share of the window, place from the mean place as a share of the way, heading from
+the mean heading, square of the distance from the mean place, from its mean, velocity, speed, rate
+of turn."""
+MEANS = (
+    "u u", "u w", "w w", "u q", "w q", "q q", "u b", "w a", "one a", "one b",
+    "heading heading", "speed speed", "one rate", "time rate", "time heading",
 )  # fmt: skip
-"""Those whose mean over the window is used."""
+"""Products of signals whose mean over the window is used."""
+SUMS = ("end u", "end w", "net", "turned", "way")
+"""Sums over the window, without sign."""
+CIRCLE = {
+    "determinant": {"u u * w w": 2.0, "u w * u w": -2.0},
+    "x": {"w w * u q": 1.0, "u w * w q": -1.0},
+    "y": {"u u * w q": 1.0, "u w * u q": -1.0},
+}
+"""The normal equations' solution: x and y of the centre times the determinant."""
+MEASURES = {
+    "off": {"q q": 1.0, "x * u q": -2.0, "y * w q": -2.0},
+    "swept": {"u b": 1.0, "w a": -1.0, "x * one b": -1.0, "y * one a": 1.0},
+    "radius squared": {"x * x": 1.0, "y * y": 1.0, "u u": 1.0, "w w": 1.0},
+    "turned right": {"turned": 1.0, "net": -1.0},
+    "turned left": {"turned": 1.0, "net": 1.0},
+    "spread": {"u u": 1.0, "w w": 1.0},
+    "heading's": {"heading heading": 1.0},
+    "speed's": {"speed speed": 1.0},
+    "rate": {"one rate": 1.0 / STEP_S},
+    "rate's trend": {"time rate": 1.0 / STEP_S},
+    "heading's trend": {"time heading": 1.0},
+    "turned": {"turned": 1.0},
+    "net": {"net": 1.0},
+}
+"""Of what a motion's features in a plane are made: sums of means, sums and products of two."""
+WHOLE_SIGNALS = ("one", "x", "y", "z", "climb", "speed")
+WHOLE_MEANS = ("one x", "one y", "one z", "one climb", "one speed", "z z", "speed speed")
+SPREADS = {
+    "straight": {"one x * one x": 1.0, "one y * one y": 1.0, "one z * one z": 1.0},
+    "climb's": {"z z": 1.0, "one z * one z": -1.0},
+    "speed's": {"speed speed": 1.0, "one speed * one speed": -1.0},
+}
+
+
+def _places(products: Sequence[str], names: Sequence[str]) -> Tensor:
+    """Where products "a b" of named rows stand in the flattened matrix of all products."""
+    pairs = [product.split(" ") for product in products]
+    return torch.tensor([names.index(a) * len(names) + names.index(b) for a, b in pairs])
+
+
+def _factors(products: Sequence[str], names: Sequence[str]) -> Tensor:
+    """The two factors (2, n) of products "a * b" as indices of names."""
+    pairs = [product.split(" * ") for product in products]
+    return torch.tensor([[names.index(one) for one in pair] for pair in pairs]).T
+
+
+def _products(sums: Mapping[str, Mapping[str, float]]) -> list[str]:
+    """The products of two in sums, each once."""
+    return list(dict.fromkeys(term for terms in sums.values() for term in terms if "*" in term))
+
+
+def _matrix(sums: Mapping[str, Mapping[str, float]], terms: Sequence[str]) -> Tensor:
+    """The matrix (terms, sums) that a row of terms is multiplied by."""
+    return torch.tensor([[each.get(term, 0.0) for each in sums.values()] for term in terms])
 
 
 class Geometry(nn.Module):
     """Sticks as geometry; its features stay when a motion is turned about z or mirrored."""
 
-    lag: Tensor
     left: Tensor
+    across: Tensor
+    lag: Tensor
     products: Tensor
+    ridge: Tensor
+    circle: Tensor
+    solve: Tensor
+    around: Tensor
+    measure: Tensor
     floors: Tensor
+    wholes: Tensor
+    spread: Tensor
 
     CHANNELS = 8
-    STICKS = (0, 1, 5, 2)
+    STICKS = (3, 4, 2, 5)
     """Which of the channels are the sticks themselves: vx, vy, vz, wz."""
     SUMMARY = 18 * PLANES + 10
 
     def __init__(self) -> None:
         super().__init__()
-        # A quarter turn to the left of the first two components.
-        left = torch.tensor([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-        self.register_buffer("left", left, persistent=False)
+        # A quarter turn to the left; of the first two components, without the third.
+        left = torch.tensor([[0.0, -1.0], [1.0, 0.0]])
         decay = torch.exp(-STEP_S / LAG_S * torch.arange(LAG_TAPS - 1.0, -1.0, -1.0))
-        lag = torch.eye(2)[:, :, None] * decay * (1.0 - math.exp(-STEP_S / LAG_S))
-        self.register_buffer("lag", lag, persistent=False)
-        places = torch.tensor([first * (RATE + 1) + second for first, second in PRODUCTS])
-        self.register_buffer("products", places, persistent=False)
-        floors = torch.tensor(FLOORS)[:, None]
-        self.register_buffer("floors", floors, persistent=False)
+        around = _products(MEASURES)
+        known = ["x", "y", *MEANS, *SUMS]
+        squares = [f"{mean} * {mean}" for mean in WHOLE_MEANS]
+        for name, constant in {
+            "left": left,
+            "across": F.pad(left, (0, 1, 0, 1)),
+            "lag": torch.eye(2)[:, :, None] * decay * (1.0 - math.exp(-STEP_S / LAG_S)),
+            "products": _places(MEANS, SIGNALS),
+            "ridge": RIDGE * torch.tensor([float(mean in ("u u", "w w")) for mean in MEANS]),
+            "circle": _factors(_products(CIRCLE), MEANS),
+            "solve": _matrix(CIRCLE, _products(CIRCLE)),
+            "around": _factors(around, known),
+            "measure": _matrix(MEASURES, [*known, *around]),
+            "floors": torch.tensor(FLOORS),
+            "wholes": _places(WHOLE_MEANS, WHOLE_SIGNALS),
+            "spread": _matrix(SPREADS, [*WHOLE_MEANS, *squares]),
+        }.items():
+            self.register_buffer(name, constant, persistent=False)
 
     def forward(
         self, sticks: Tensor, times_s: Tensor, lengths: Tensor, full_yaw_radps: Tensor
@@ -85,45 +159,42 @@ class Geometry(nn.Module):
             Channels (B, CHANNELS, T / STRIDE), 0 where padded; mask (B, 1, T / STRIDE), 1 where
             not; summary (B, SUMMARY).
         """
-        real = (torch.arange(sticks.shape[1]) < lengths.unsqueeze(1)).to(sticks.dtype)
-        x = (sticks * real.unsqueeze(2)).transpose(1, 2)
-        v, raw, mask = self._velocity(x, times_s, real.unsqueeze(1), full_yaw_radps)
-        flat, vz = torch.split(v, [2, 1], 1)
+        real = (torch.arange(sticks.shape[1]) < lengths.view(-1, 1, 1)).to(sticks.dtype)
+        x = sticks.transpose(1, 2) * real
+        clock_s = times_s.unsqueeze(1)
+        motion = self._motion(x, clock_s, real, full_yaw_radps.view(-1, 1, 1))
+        mask = real[:, :, ::STRIDE]
+        flat, vz, _ = torch.split(motion, [2, 1, 3], 1)
         upright = torch.cat([self._ahead(flat), UP_PER_AHEAD * vz], 1)
         flown = F.conv1d(F.pad(flat, (LAG_TAPS - 1, 0)), self.lag) * mask
         planes = torch.stack([flat, upright, flown], 1)
         shapes, rate = self._shapes(planes, mask.unsqueeze(1))
-        time_s = mask * times_s[:, ::STRIDE].unsqueeze(1)
-        channels = torch.cat([raw, v, rate, time_s], 1)
-        return channels, mask, torch.cat([shapes, self._whole(v, mask)], 1)
+        channels = torch.cat([motion, rate, mask * clock_s[:, :, ::STRIDE]], 1)
+        return channels, mask, torch.cat([shapes, self._whole(motion[:, :3], mask)], 1)
 
-    def _velocity(
-        self, x: Tensor, times_s: Tensor, real: Tensor, full_yaw_radps: Tensor
-    ) -> tuple[Tensor, Tensor, Tensor]:
-        """Smoothed sticks (B, 4, T) in the frame of the first heading, and as the pad sends them.
+    def _motion(self, x: Tensor, clock_s: Tensor, real: Tensor, full_yaw_radps: Tensor) -> Tensor:
+        """Smoothed motion (B, 6, T / STRIDE), 0 where padded.
 
         Returns:
-            vx vy vz (B, 3, T / STRIDE) in a frame that does not turn with the vehicle; vx and vy as
-            they are with the yaw rate in rad/s; the mask.
+            vx vy vz in the frame of the first heading, which does not turn with the vehicle; vx and
+            vy as the pad sends them, and the yaw rate, rad/s.
         """
         flat, vz, wz = torch.split(x, [2, 1, 1], 1)
-        turning = wz * full_yaw_radps[:, None, None]
+        turning = wz * full_yaw_radps
         # A stick is held until the next one, so a step turns by the stick at its beginning.
-        held = turning[:, 0, :-1] * (times_s[:, 1:] - times_s[:, :-1])
-        yaw = torch.cumsum(F.pad(held, (1, 0)), 1).unsqueeze(1)
-        sideways = torch.matmul(self.left[:2, :2], flat)
+        held = turning[:, :, :-1] * (clock_s[:, :, 1:] - clock_s[:, :, :-1])
+        yaw = torch.cumsum(F.pad(held, (1, 0)), 2)
+        sideways = torch.matmul(self.left, flat)
         straight = torch.cos(yaw) * flat + torch.sin(yaw) * sideways
         stacked = torch.cat([straight, vz, flat, turning, real], 1)
         means = F.avg_pool1d(stacked, SMOOTH_TAPS, STRIDE, SMOOTH_TAPS // 2)
-        mask = real[:, :, ::STRIDE]
-        v, raw, share = torch.split(means, [3, 3, 1], 1)
-        scale = mask / share.clamp(min=1.0 / SMOOTH_TAPS)
-        return v * scale, raw * scale, mask
+        motion, share = torch.split(means, [6, 1], 1)
+        return motion * (real[:, :, ::STRIDE] / share.clamp(min=1.0 / SMOOTH_TAPS))
 
     @staticmethod
     def _ahead(flat: Tensor) -> Tensor:
         """The part (B, 1, T) of a horizontal motion that is along its main axis."""
-        moments = torch.matmul(flat, flat.transpose(1, 2)).flatten(1).unsqueeze(2)
+        moments = torch.matmul(flat, flat.transpose(1, 2)).view(-1, 4, 1)
         xx, xy, yx, yy = torch.split(moments, 1, 1)
         half = 0.5 * (xx - yy)
         square = xy * yx
@@ -140,90 +211,83 @@ class Geometry(nn.Module):
             mask: (B, 1, 1, T).
 
         Returns:
-            Features (B, n); rates of turn (B, 1, T) in the first plane, rad/s.
+            Features (B, n); turns (B, 1, T) in the first plane, rad a step.
         """
-        count = mask.sum(3, keepdim=True)
-        speed = torch.sqrt((v * v).sum(2, keepdim=True) + 1e-8) * mask
+        count = mask.sum(3)
+        share = mask / count.unsqueeze(3)
+        speed = torch.linalg.vector_norm(v, dim=2, keepdim=True)
         # Turns from step to step, by the tangent of half the angle: no quadrants, and going
         # straight back turns to no side. Those of a resting stick count for nothing.
         both = torch.cat([v, speed], 2)
         before, after = both[:, :, :, :-1], both[:, :, :, 1:]
         agree = before * after
         energy = agree[:, :, 2:]
-        cross = (torch.matmul(self.left, before) * after).sum(2, keepdim=True)
+        cross = (torch.matmul(self.across, before) * after).sum(2, keepdim=True)
         half = torch.atan(cross / (agree.sum(2, keepdim=True) + BACK))
         turn = F.pad(half * energy / (0.5 * energy + 0.5 * STILL * STILL), (1, 0))
 
         # Along the chord, mirrored so that the whole turns to the left; places as shares of the
         # way. Along the chord what is nearly straight has small products without cancellation.
         sums = torch.cat([v, turn, turn.abs(), speed], 2).sum(3, keepdim=True)
-        end, net, turned, way = torch.split(sums, [2, 1, 1, 1], 2)
+        end, net, _, way = torch.split(sums, [2, 1, 1, 1], 2)
         side = torch.sign(net + 1e-9)
-        net = net * side
-        share = 1.0 / (way + SHORT_WAY)
-        chord = end / torch.sqrt((end * end).sum(2, keepdim=True) + 1e-6)
-        frame = torch.cat([chord, torch.matmul(self.left[:2, :2], chord)], 3).transpose(2, 3)
+        size = 1.0 / (way + SHORT_WAY)
+        chord = end / (torch.linalg.vector_norm(end, dim=2, keepdim=True) + 1e-3)
+        frame = torch.cat([chord, torch.matmul(self.left, chord)], 3).transpose(2, 3)
         local = torch.matmul(frame, v)
-        moves = torch.cat([local, turn], 2) * torch.cat([share, share * side, side], 2)
+        moves = torch.cat([local, turn], 2) * torch.cat([size, size * side, side], 2)
         sides, turns = torch.split(moves, [2, 1], 2)
+        weights = share.transpose(2, 3)
         paths = torch.cumsum(moves, 3)
-        paths = (paths - (paths * mask).sum(3, keepdim=True) / count) * mask
+        paths = (paths - torch.matmul(paths, weights)) * mask
         places, heading = torch.split(paths, [2, 1], 2)
         distance = (places * places).sum(2, keepdim=True)
-        distance = (distance - distance.sum(3, keepdim=True) / count) * mask
-        rate = F.avg_pool2d(turns, (1, RATE_TAPS), 1, (0, RATE_TAPS // 2)) / STEP_S
-        clock = torch.cat([mask, torch.cumsum(mask, 3) / count * mask], 2)
+        distance = (distance - torch.matmul(distance, weights)) * mask
+        rate = F.avg_pool2d(turns, (1, RATE_TAPS), 1, (0, RATE_TAPS // 2))
+        clock = torch.cat([mask, torch.cumsum(share, 3) * mask], 2)
         clock = torch.cat([clock] * PLANES, 1)
         signals = torch.cat([clock, places, heading, distance, sides, speed, rate], 2)
-        moments = torch.matmul(signals, signals.transpose(2, 3)) / count
-        means = moments.flatten(2)[:, :, self.products].unsqueeze(3)
-        uu, uw, ww, uq, wq, qq, ub, wa, a, b, headings, speeds, trends = torch.split(
-            means, [1] * 12 + [3], 2
-        )
+        moments = torch.matmul(signals, signals.transpose(2, 3))
+        moments = moments.view(-1, PLANES, len(SIGNALS) ** 2)
+        means = moments[:, :, self.products] / count + self.ridge
 
         # The circle of least algebraic distance (Kasa 1976): how far off it, how far around it.
-        p, r = uu + RIDGE, ww + RIDGE
-        determinant = 2.0 * (p * r - uw * uw)
-        x, y = (r * uq - uw * wq) / determinant, (p * wq - uw * uq) / determinant
-        spread = uu + ww
-        radius_squared = x * x + y * y + spread + RIDGE
-        off = (qq - 2.0 * (x * uq + y * wq)) / radius_squared
-        swept = (ub - wa - x * b + y * a) / radius_squared * count
-        sizes = torch.cat(
-            [turned - net, turned + net, off, radius_squared, spread, headings, speeds], 2
+        solved = torch.matmul(means[:, :, self.circle[0]] * means[:, :, self.circle[1]], self.solve)
+        determinant, centre = torch.split(solved, [1, 2], 2)
+        known = torch.cat([centre / determinant, means, sums.squeeze(3).abs()], 2)
+        known = torch.cat([known, known[:, :, self.around[0]] * known[:, :, self.around[1]]], 2)
+        ratios, radius_squared, sizes, others = torch.split(
+            torch.matmul(known, self.measure), [2, 1, 5, 5], 2
         )
-        # Padding is 0: never the largest, but for a stick that is beyond full speed throughout.
-        reach = torch.cat([heading, -heading, speed, mask - speed], 2)
+        off, swept = torch.split(ratios / radius_squared, 1, 2)
+        sizes = torch.cat([off, radius_squared, sizes], 2)
+        turned, net = others[:, :, 3:4], others[:, :, 4:]
+        # Padding is 0: never the largest.
+        reach = torch.cat([heading, -heading, speed, mask + mask - speed], 2)
         features = torch.cat(
             [
                 torch.log(F.relu(sizes) + self.floors),
-                trends,
-                swept,
-                turned,
-                net,
+                others,
+                swept * count,
                 net / (turned + 0.02),
-                reach.amax(3, keepdim=True),
+                reach.amax(3),
             ],
             2,
         )
         return features.flatten(1), rate[:, 0] * side[:, 0]
 
-    @staticmethod
-    def _whole(v: Tensor, mask: Tensor) -> Tensor:
+    def _whole(self, v: Tensor, mask: Tensor) -> Tensor:
         """Features (B, n) that belong to no plane: time, speed, climb."""
-        count = mask.sum(2, keepdim=True)
-        squares = v * v
-        squared = squares.sum(1, keepdim=True)
-        speed = torch.sqrt(squared + 1e-8) * mask
-        signals = torch.cat([v, v[:, 2:].abs(), speed, squares[:, 2:], squared], 1)
-        means = signals.sum(2, keepdim=True) / count
-        net, climb, level, climb_squares, level_squares = torch.split(means, [3, 1, 1, 1, 1], 1)
-        rise = net[:, 2:].abs()
-        pace = level + 0.02
-        spreads = torch.cat([climb_squares - rise * rise, level_squares - level * level], 1)
+        count = mask.sum(2)
+        speed = torch.linalg.vector_norm(v, dim=1, keepdim=True)
+        signals = torch.cat([mask, v, v[:, 2:].abs(), speed], 1)
+        moments = torch.matmul(signals, signals.transpose(1, 2)).flatten(1)
+        means = moments[:, self.wholes] / count
+        spreads = torch.matmul(torch.cat([means, means * means], 1), self.spread)
         spreads = torch.sqrt(F.relu(spreads) + 1e-3)
-        straight = torch.sqrt((net * net).sum(1, keepdim=True) + 1e-8)
+        _, rise, climb, level, _ = torch.split(means.abs(), [2, 1, 1, 1, 2], 1)
+        pace = level + 0.02
         duration_s = count * STEP_S
-        shares = torch.cat([climb, rise, straight, spreads], 1) / pace
-        steady = rise / (torch.cat([climb, spreads[:, :1]], 1) + 0.1)
-        return torch.cat([duration_s, torch.log(duration_s), pace, shares, steady], 1).squeeze(2)
+        shares = torch.cat([climb, rise, spreads], 1) / pace
+        steady = rise / (torch.cat([climb, spreads[:, 1:2]], 1) + 0.1)
+        return torch.cat([duration_s, torch.log(duration_s), pace, shares, steady], 1)

@@ -15,6 +15,8 @@ from training.geometry import Geometry
 from training.labels import PRIMITIVES
 
 LEAK = 0.1
+TAPS = (7, 5, 5, 3)
+"""Of the convolutions."""
 LARGEST = 6.0
 """Inputs beyond so many standard deviations say no more than this."""
 FLAT = 0.05
@@ -35,6 +37,7 @@ class Architecture:
 
     Attributes:
         width: channels of the convolutions and units of the GRUs; 0 leaves both out.
+        strides: of the convolutions.
         summary: units of the two layers that read the summary; 0 leaves it out.
         head: units of the head's hidden layer.
         dropout: of all dropout layers.
@@ -46,7 +49,8 @@ class Architecture:
         pooling: what is taken of the GRUs' states over time.
     """
 
-    width: int = 32
+    width: int = 24
+    strides: tuple[int, int, int, int] = (2, 2, 2, 2)
     summary: int = 128
     head: int = 64
     dropout: float = 0.1
@@ -98,6 +102,7 @@ class Encoder(nn.Module):
     Args:
         channels: of the series.
         width: channels of the convolutions and units of the GRUs.
+        strides: of the convolutions.
         dropout: between convolutions and GRUs.
         pooling: of "last", "mean", "largest".
     """
@@ -106,18 +111,16 @@ class Encoder(nn.Module):
         self,
         channels: int,
         width: int,
+        strides: tuple[int, int, int, int],
         dropout: float,
         pooling: tuple[str, ...] = Architecture.pooling,
     ) -> None:
         super().__init__()
         self.standardise = nn.BatchNorm1d(channels)
+        inputs = (channels, width, width, width)
         self.convolutions = nn.ModuleList(
-            [
-                _Convolution(channels, width, 7, 2),
-                _Convolution(width, width, 5, 2),
-                _Convolution(width, width, 5, 2),
-                _Convolution(width, width, 3, 1),
-            ]
+            _Convolution(before, width, taps, stride)
+            for before, taps, stride in zip(inputs, TAPS, strides, strict=True)
         )
         self.dropout = nn.Dropout(dropout)
         self.gru = nn.GRU(width, width, num_layers=2, batch_first=True)
@@ -143,6 +146,10 @@ class Encoder(nn.Module):
         return torch.cat(pooled, 1)
 
 
+TRUNK_STRIDES = (2, 2, 2, 1)
+"""Recordings may be of 10 samples."""
+
+
 class Trunk(nn.Module):
     """The network on any series: the encoder and a linear head, without sticks or geometry.
 
@@ -161,7 +168,7 @@ class Trunk(nn.Module):
         dropout: float = Architecture.dropout,
     ) -> None:
         super().__init__()
-        self.encoder = Encoder(channels, width, dropout)
+        self.encoder = Encoder(channels, width, TRUNK_STRIDES, dropout)
         self.head = nn.Sequential(nn.Dropout(dropout), nn.Linear(self.encoder.features, classes))
 
     def forward(self, x: Tensor, mask: Tensor) -> Tensor:
@@ -182,7 +189,7 @@ class Network(nn.Module):
         features = 0
         if a.width:
             channels = Geometry.CHANNELS if a.geometry else len(Geometry.STICKS)
-            self.encoder = Encoder(channels, a.width, a.dropout, a.pooling)
+            self.encoder = Encoder(channels, a.width, a.strides, a.dropout, a.pooling)
             features += self.encoder.features
         if a.summary:
             self.standardise = _Standard(Geometry.SUMMARY)

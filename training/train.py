@@ -50,7 +50,7 @@ PRESETS = {
         training=Share(wide_people=600, wide=8.0, thesis_people=250, thesis=4.0),
         validation=Share(wide_people=75, wide=0.7, thesis_people=50, thesis=0.4),
         test=Share(wide_people=100, wide=1.0, thesis_people=50, thesis=1.0),
-        budget=Budget(windows=1_200_000),
+        budget=Budget(windows=2_000_000),
     ),
     "quick": Preset(
         training=Share(wide_people=24, wide=0.4, thesis_people=10, thesis=0.2),

@@ -49,10 +49,10 @@ class Cuts:
         spliced: begin with the end of another primitive, flown into this one without a pause.
     """
 
-    whole: float = 0.5
-    early: float = 0.3
+    whole: float = 0.65
+    early: float = 0.6
     headless: float = 0.05
-    spliced: float = 0.1
+    spliced: float = 0.05
 
 
 CUTS = Cuts()

@@ -120,12 +120,18 @@ def test_the_shipped_model_knows_a_vertical_line(shipped: OnnxModel, sense: floa
 
 
 def test_the_shipped_model_takes_a_wide_slow_turn_for_an_arc(shipped: OnnxModel) -> None:
-    """0.8 m/s on a circle of 4 m: steered by yaw it shows after 63 degrees, strafed after 86."""
-    steered = np.tile(np.array([0.8, 0.0, 0.0, 0.2], dtype=np.float32), (275, 1))
+    """0.8 m/s on a circle of 4 m: steered by yaw it shows after 63 degrees, strafed after 86.
+
+    The stick takes 0.3 s to rise, as thumbs do.
+    """
+    t = np.arange(0.0, 7.5, 0.02)
+    push = 0.8 * np.clip(t / 0.3, 0.0, 1.0)
+    level, turning = np.zeros_like(t), np.full_like(t, 0.2)
+    steered = np.stack([push, level, level, turning], axis=1).astype(np.float32)[:275]
     answer = shipped.answer(steered, 1.0)
     assert shipped.labels[int(answer.probabilities.argmax())] == "arc"
-    angle = 0.2 * np.arange(0.0, 7.5, 0.02)
-    assert said_of(shipped, 0.8 * np.cos(angle), 0.8 * np.sin(angle), 0.0 * angle) == "arc"
+    angle = turning * t
+    assert said_of(shipped, push * np.cos(angle), push * np.sin(angle), level) == "arc"
 
 
 def test_the_shipped_model_sees_a_curve_that_is_flown_by_yaw(shipped: OnnxModel) -> None:
