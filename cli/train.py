@@ -32,7 +32,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     job.add_argument(
         "--preset",
         choices=PRESETS,
-        help="how much to train on: shipped (about 12 minutes, the default) or quick (under one)",
+        help="how much to train on: shipped (about 11 minutes, the default) or quick (under one)",
     )
     parser.add_argument("--seed", type=opts.seed, help="same seed, same model (0)")
     parser.add_argument(

@@ -16,7 +16,7 @@ import torch
 from services.classifier.model import CONTRACT, INPUTS, OUTPUTS
 from services.classifier.window import MODEL_RATE_HZ
 from training.fit import FULL_YAW_RADPS, Fitted, inputs_of
-from training.network import Architecture, Network
+from training.network import VERSION, Architecture, Network
 from training.windows import padded
 
 OPSET = 17
@@ -69,6 +69,7 @@ def save(fitted: Fitted, path: Path) -> None:
     """Write the weights as torch has them, for `finetune`: ONNX files fold batch norms away."""
     torch.save(
         {
+            "version": VERSION,
             "architecture": asdict(fitted.network.architecture),
             "weights": fitted.network.state_dict(),
             "scaling": fitted.scaling,
@@ -95,6 +96,8 @@ def load(path: Path) -> Fitted:
     except (RuntimeError, EOFError, pickle.UnpicklingError):
         raise _unfit(path) from None
     try:
+        if state["version"] != VERSION:
+            raise _unfit(path)
         network = Network(Architecture(**state["architecture"]))
         network.load_state_dict(state["weights"])
         scaling = tuple(state["scaling"])

@@ -21,7 +21,7 @@ STEP_S = STRIDE / MODEL_RATE_HZ
 SMOOTH_TAPS = 9
 """Samples: 0.18 s, above tremor's period, below the quickest gesture's."""
 RATE_TAPS = 5
-"""Steps: rates of turn are means over 0.2 s."""
+"""Steps: rates of turn (rad a step, until they are measures) are means over 0.2 s."""
 STILL = 0.1
 """Below this deflection a direction is mostly noise."""
 BACK = 1e-4
@@ -37,14 +37,22 @@ pilots' sticks lead it."""
 SHORT_WAY = 0.25
 """Added to ways, in steps of full stick, so that nothing is divided by 0."""
 RIDGE = 1e-6
-"""Of a circle's normal equations, in squares of the way: a line's circle has a finite radius."""
-FLOORS = (1e-4, 1e-5, 0.02, 0.02, 1e-5, 1e-4, 3e-3)
-"""Added before a logarithm is taken: what is much smaller is noise, a rounding error, or steadier
-than a hand."""
+"""Added to mean squares of places, in squares of the way: a line's circle has a finite radius."""
+FLOORS = {
+    "off": 1e-4,
+    "radius squared": 1e-5,
+    "turned right": 0.02,
+    "turned left": 0.02,
+    "spread": 1e-5,
+    "heading's": 1e-4,
+    "speed's": 3e-3,
+}
+"""Of the measures whose logarithm is taken, added before: what is much smaller is noise, a rounding
+error, or steadier than a hand."""
 SIGNALS = ("one", "time", "u", "w", "heading", "q", "a", "b", "speed", "rate")
 """1, time as a share of the window, place from the mean place as a share of the way, heading from
 the mean heading, square of the distance from the mean place, from its mean, velocity, speed, rate
-of turn."""
+of turn in rad a step."""
 MEANS = (
     "u u", "u w", "w w", "u q", "w q", "q q", "u b", "w a", "one a", "one b",
     "heading heading", "speed speed", "one rate", "time rate", "time heading",
@@ -74,6 +82,8 @@ MEASURES = {
     "net": {"net": 1.0},
 }
 """Of what a motion's features in a plane are made: sums of means, sums and products of two."""
+SPREAD_FLOOR = 1e-3
+"""Added to the squares below: a fortieth of full stick is no spread, and no net motion."""
 WHOLE_SIGNALS = ("one", "x", "y", "z", "climb", "speed")
 WHOLE_MEANS = ("one x", "one y", "one z", "one climb", "one speed", "z z", "speed speed")
 SPREADS = {
@@ -144,7 +154,7 @@ class Geometry(nn.Module):
             "solve": _matrix(CIRCLE, _products(CIRCLE)),
             "around": _factors(around, known),
             "measure": _matrix(MEASURES, [*known, *around]),
-            "floors": torch.tensor(FLOORS),
+            "floors": torch.tensor(list(FLOORS.values())),
             "wholes": _places(WHOLE_MEANS, WHOLE_SIGNALS),
             "spread": _matrix(SPREADS, [*WHOLE_MEANS, *squares]),
         }.items():
@@ -211,7 +221,7 @@ class Geometry(nn.Module):
             mask: (B, 1, 1, T).
 
         Returns:
-            Features (B, n); turns (B, 1, T) in the first plane, rad a step.
+            Features (B, n); rates of turn (B, 1, T) in the first plane, rad a step.
         """
         count = mask.sum(3)
         share = mask / count.unsqueeze(3)
@@ -284,7 +294,7 @@ class Geometry(nn.Module):
         moments = torch.matmul(signals, signals.transpose(1, 2)).flatten(1)
         means = moments[:, self.wholes] / count
         spreads = torch.matmul(torch.cat([means, means * means], 1), self.spread)
-        spreads = torch.sqrt(F.relu(spreads) + 1e-3)
+        spreads = torch.sqrt(F.relu(spreads) + SPREAD_FLOOR)
         _, rise, climb, level, _ = torch.split(means.abs(), [2, 1, 1, 1, 2], 1)
         pace = level + 0.02
         duration_s = count * STEP_S

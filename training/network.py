@@ -14,6 +14,9 @@ from training.calibration import Scaling, scaled
 from training.geometry import Geometry
 from training.labels import PRIMITIVES
 
+VERSION = 2
+"""Of what the shapes of weights do not tell: channels, features, their order and formulas. Add 1
+with each change of these: weights of another version are refused."""
 LEAK = 0.1
 TAPS = (7, 5, 5, 3)
 """Of the convolutions."""

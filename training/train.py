@@ -13,6 +13,7 @@ from training.card import card_of
 from training.export import export, save
 from training.fit import FULL_YAW_RADPS, Budget, Epoch, Fitted, Training
 from training.labels import PRIMITIVES
+from training.network import VERSION
 from training.people import Share, people_of
 from training.scores import (
     Score,
@@ -209,7 +210,7 @@ def train(
 
     training = people("training", preset.training, 0)
     validation = people("validation", preset.validation, 1)
-    learned = f"people {digest(training, validation)}"
+    learned = f"people {digest(training, validation)}, network {VERSION}"
     name = f"{preset_name}, {preset.budget.windows} windows, seed {seed}, {learned}"
     run = Training(training, validation, seed, preset.budget, name=name)
     if resume:

@@ -163,7 +163,7 @@ def load_file(path: FilePath, name: str | None = None) -> World:
     """
     try:
         read = msgspec.yaml.decode(path.read_bytes(), type=_File)
-    except (OSError, UnicodeDecodeError, msgspec.DecodeError) as error:
+    except (OSError, ValueError, msgspec.DecodeError) as error:
         raise WorldError(f"{path}: {_line_of(error)}") from None
     if read.lane is not None and read.ideal_path is None:
         raise WorldError(f"{path}: `lane` needs an `ideal_path` to lie along")

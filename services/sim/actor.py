@@ -28,7 +28,7 @@ The fastest loop of a plant has 20 ms, and is integrated as the step responses i
 STEP_S = 1.0 / PHYSICS_HZ
 STEP_NS = NS_PER_S // PHYSICS_HZ
 
-IN_THE_AIR_M = 0.1
+IN_THE_AIR_M = 0.05
 """A vehicle that starts this far above what is below it starts flying."""
 
 

@@ -182,7 +182,7 @@ class Hull:
         pressed = [point for point in points if point[9] > 0.0]
         touched = {point[2] for point in pressed}
         # The normals point to the vehicle.
-        side = any(point[7][2] < _CARRIED_COS for point in pressed)
+        side = any(abs(point[7][2]) < _CARRIED_COS for point in pressed)
         return Touch(self._ground in touched, bool(touched - {self._ground}), side)
 
     def _is_crowded(self, position_m: Vector3) -> bool:

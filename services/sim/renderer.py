@@ -127,7 +127,8 @@ class _Target:
     def begin(self) -> None:
         """Draw into it from now on."""
         self._frame.use()
-        self._frame.clear()
+        # Where there is neither ground nor sky, far out, there is haze; colours are BGR here.
+        self._frame.clear(*reversed(shaders.HAZE))
 
     def read(self) -> Picture:
         """What was drawn (height, width, 3)."""

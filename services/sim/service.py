@@ -130,9 +130,10 @@ def wire(node: Node, config: Config) -> None:
         each.publishes("imu", "truth", "altimeter", "vehicle", *VIDEO_TOPICS)
         if in_lockstep:
             # Their time is the steps': however long these take, a command is that of the next ones.
-            each.on("command", partial(obey, index), depth=depth, timed=True, ages=False)
+            each.on("command", partial(obey, index), depth=BACKLOG, timed=True, ages=False)
         else:
-            each.on("command", partial(hear, index), depth=depth)
+            # The box before the inbox drops without looking, so it has to be the roomier one.
+            each.on("command", partial(hear, index), depth=BACKLOG)
         each.answer("sim/reset", partial(reset, index))
         each.answer("sim/worlds", names_worlds)
         each.reports(health)

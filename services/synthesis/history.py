@@ -24,9 +24,9 @@ REST_MPS = 0.1
 REST_S = 1.0
 """A vehicle that makes less way than this speed would for this time has ended its motion."""
 HELD_S, HELD_LEAST_S = 6.0, 1.5
-HELD_M = 0.8
-"""A vehicle that stayed within this of its mean place for `HELD_S`, or as long as is known but at
-least the second time, was held there."""
+HELD_M, HELD_MPS = 0.8, 0.4
+"""A vehicle that stayed within this of its mean place and of where it was for `HELD_S`, or as long
+as is known but at least the second time, and made no more way than at this speed, was held."""
 HELD_FACTOR, HELD_MORE_M = 2.0, 0.1
 """Corrections take it no farther than this many times as far as it strayed before, and a little."""
 GAP_S = 0.5
@@ -80,7 +80,7 @@ class History:
 
     def track(self, begin_ns: int, end_ns: int) -> Track | None:
         """The way flown by the poses that arrived within a window; None if there are under two."""
-        chosen = [(ns, pose) for ns, pose in self._poses if begin_ns <= ns <= end_ns]
+        chosen = self._between(begin_ns, end_ns)
         if len(chosen) < 2:
             return None
         time_s, position_m, way_m = _motion(chosen)
@@ -100,12 +100,16 @@ class History:
         """
         if not self._poses or begin_ns - self._poses[0][0] < nanoseconds(HELD_LEAST_S):
             return False
-        before_m = self._places_m(begin_ns - nanoseconds(HELD_S), begin_ns)
+        time_s, before_m, way_m = _motion(self._between(begin_ns - nanoseconds(HELD_S), begin_ns))
         place_m = before_m.mean(axis=0)
         strayed_m = float(np.linalg.norm(before_m - place_m, axis=1).max())
-        now_m = self._places_m(begin_ns, end_ns)
-        reached_m = float(np.linalg.norm(now_m - place_m, axis=1).max(initial=0.0))
-        return strayed_m <= HELD_M and reached_m <= HELD_FACTOR * strayed_m + HELD_MORE_M
+        moved_m = float(np.linalg.norm(before_m[-1] - before_m[0]))
+        flew = way_m[-1] > HELD_MPS * (time_s[-1] - time_s[0])
+        if flew or max(strayed_m, moved_m) > HELD_M:
+            return False
+        now_m = [pose.position for _, pose in self._between(begin_ns, end_ns)]
+        reached_m = max((math.dist(each_m, place_m) for each_m in now_m), default=0.0)
+        return reached_m <= HELD_FACTOR * strayed_m + HELD_MORE_M
 
     def since_rest(self, end_ns: int) -> Array:
         """Points (N, 3) about `CELL_M` apart of the way flown since the vehicle last rested."""
@@ -120,10 +124,9 @@ class History:
         way_m = way_m[first:] - way_m[first]
         return _means(position_m[first:], np.floor(way_m / CELL_M))
 
-    def _places_m(self, begin_ns: int, end_ns: int) -> Array:
-        """Positions (N, 3) that arrived within a time."""
-        places = [pose.position for ns, pose in self._poses if begin_ns <= ns <= end_ns]
-        return np.array(places).reshape(-1, 3)
+    def _between(self, begin_ns: int, end_ns: int) -> list[tuple[int, Pose]]:
+        """The poses that arrived within a time, and when."""
+        return [(ns, pose) for ns, pose in self._poses if begin_ns <= ns <= end_ns]
 
 
 def _motion(chosen: list[tuple[int, Pose]]) -> tuple[Array, Array, Array]:

@@ -29,7 +29,7 @@ def load(name: str) -> type[Plant]:
     try:
         plant = getattr(importlib.import_module(module), "PLANT", None)
         fault = faults_of(plant)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ValueError(f"{_place_in(file, error)}: {_first_line(error)}") from None
     if fault:
         raise ValueError(f"{file}: {fault}")
@@ -37,7 +37,7 @@ def load(name: str) -> type[Plant]:
     return plant
 
 
-def _place_in(file: str, error: Exception) -> str:
+def _place_in(file: str, error: BaseException) -> str:
     """The file, and the line in it that an error came from."""
     if isinstance(error, SyntaxError):
         return file
@@ -49,6 +49,6 @@ def _place_in(file: str, error: Exception) -> str:
     return f"{file}:{lines[-1]}" if lines else file
 
 
-def _first_line(error: Exception) -> str:
+def _first_line(error: BaseException) -> str:
     text = next(iter(str(error).splitlines()), "")
     return f"{type(error).__name__}: {text}".removesuffix(": ")

@@ -55,7 +55,7 @@ def test_an_emergency_in_a_flood_of_sticks_is_obeyed() -> None:
     wire(node, Config(renderer="none", world="empty"))
     orders = ears.publication(key_of("unit", "command"), None, "")  # type: ignore[arg-type]
     orders.put(encode(command(action="emergency")))
-    for _ in range(50):
+    for _ in range(200):
         orders.put(encode(command(Sticks(vx=1.0))))
     clock.advance(0.01)
     node.spin()

@@ -154,6 +154,7 @@ def test_a_wall_stops_it_and_counts() -> None:
 
 LEDGE = """\
 description: a ledge 1 m high with a wall on it
+start: {position_m: [0, 0, 1.5], yaw_deg: 0}
 bodies:
   - {shape: box, size_m: [4, 4, 1], position_m: [0, 0, 0.5], texture: concrete}
   - {shape: box, size_m: [0.5, 4, 2], position_m: [-1.75, 0, 1], texture: concrete}

@@ -113,7 +113,16 @@ def test_a_motion_from_standing_still_is_free_at_once():
     assert not history_of(stamped).is_held(6 * S, stamped[-1][1])
 
 
-@pytest.mark.parametrize("speed_mps", [0.4, 1.0])
+@pytest.mark.parametrize("radius_m", [0.3, 0.7])
+def test_a_vehicle_that_circles_is_not_held(radius_m):
+    def where(t):
+        return np.array([radius_m * np.cos(t / radius_m), radius_m * np.sin(t / radius_m), 1.0])
+
+    stamped = poses(where, 14.0)
+    assert not history_of(stamped).is_held(stamped[-1][1] - 4 * S, stamped[-1][1])
+
+
+@pytest.mark.parametrize("speed_mps", [0.2, 0.4, 1.0])
 def test_a_vehicle_on_its_way_is_not_held(speed_mps):
     stamped = poses(lambda t: np.array([speed_mps * t, 0.0, 1.0]), 9.0)
     assert not history_of(stamped).is_held(stamped[-1][1] - 2 * S, stamped[-1][1])

@@ -20,6 +20,7 @@ from training.finetune import in_flight
 from training.fit import Budget, Fitted, Training, said
 from training.generator.dataset import generate
 from training.labels import NONE, PRIMITIVES
+from training.network import VERSION
 from training.people import Share
 from training.windows import Examples, examples_of, seen_after
 
@@ -176,6 +177,19 @@ def test_weights_survive_the_disk(fitted: Fitted, tmp_path: Path) -> None:
     export(again, PRIMITIVES, "intent", tmp_path / "other" / "intent.onnx")
     one, other = (tmp_path / folder / "intent.onnx" for folder in ("one", "other"))
     assert one.read_bytes() == other.read_bytes()
+
+
+@pytest.mark.parametrize("version", [None, VERSION - 1])
+def test_weights_of_another_network_are_refused_though_they_fit(
+    fitted: Fitted, tmp_path: Path, version: int | None
+) -> None:
+    path = tmp_path / "intent.pt"
+    save(fitted, path)
+    state = torch.load(path, weights_only=True)
+    del state["version"]
+    torch.save(state if version is None else {**state, "version": version}, path)
+    with pytest.raises(OSError, match="not of this version's network"):
+        load(path)
 
 
 @pytest.fixture
