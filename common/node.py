@@ -235,7 +235,7 @@ class Node:
             self._idle.acquire(timeout=min(max(wait_s, 0.0), HEALTH_PERIOD_S))
 
     def wake(self) -> None:
-        """End the current wait of `run`; safe from any thread, not from a signal handler."""
+        """End the current wait of `run`; safe from any thread."""
         self._notify()
 
     def spin(self) -> None:

@@ -10,6 +10,8 @@ from common.frames import rotation_of
 from services.sim.body import HULL_M, INERTIA_KGM2, MASS_KG, Vector3
 from worlds import Body
 
+INSTRUMENTS = frozenset({"imu", "altimeter", "camera/front", "camera/down"})
+"""What a vehicle may carry: the topics of each."""
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -37,7 +39,7 @@ class Build:
     friction_tipped: float = 0.8
     front: Mount = FRONT
     down: Mount = DOWN
-    sensors: frozenset[str] = frozenset({"imu", "altimeter", "camera/front", "camera/down"})
+    sensors: frozenset[str] = INSTRUMENTS
 
     @property
     def rest_height_m(self) -> float:

@@ -32,7 +32,7 @@ class Touch:
     Attributes:
         ground: the ground.
         body: what stands there, or another vehicle.
-        side: one of these, and not only from below.
+        side: any of these, which pushes it sideways rather than up or down.
     """
 
     ground: bool = False

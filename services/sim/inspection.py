@@ -10,11 +10,10 @@ import msgspec
 
 from common.messages import FollowingRates, FullStickSpeeds
 from services.sim.body import CALM, BodyState, Loads, Sticks
-from services.sim.build import Build
+from services.sim.build import INSTRUMENTS, Build
 from services.sim.plant import Plant
 
-INSTRUMENTS = frozenset({"imu", "altimeter", "camera/front", "camera/down"})
-UNIT_ERROR = 1e-3
+_UNIT_ERROR = 1e-3
 """A quaternion's length may be off 1 by this."""
 _STEP_S = 0.005
 _LEVEL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -90,7 +89,7 @@ def _fault_of_build(build: object) -> str:
         places = [(*body.size_m, *body.position_m, *body.orientation) for body in bodies]
         if not all(map(math.isfinite, chain.from_iterable(places))):
             return f"build.{field}: the numbers of a body must be finite"
-        if any(abs(math.hypot(*body.orientation) - 1.0) > UNIT_ERROR for body in bodies):
+        if any(abs(math.hypot(*body.orientation) - 1.0) > _UNIT_ERROR for body in bodies):
             return f"build.{field}: the orientation of a body must be a quaternion of length 1"
     if not (build.mass_kg > 0.0 and all(each > 0.0 for each in build.inertia_kgm2)):
         return "build: mass_kg and inertia_kgm2 must be above 0"

@@ -12,9 +12,10 @@ from services.sim.textures import CANVAS, noise
 SIDES, RINGS = 120, 20
 """Of the dome; corners 3 deg apart let clouds look soft and hills rugged."""
 _CORNERS = np.asarray([(-1.0, -1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, 1.0), (-1.0, 1.0, 1.0)])
-GROUND_ENDS_M = 100.0
+"""Of a picture: x, y and w in clip coordinates."""
+_GROUND_ENDS_M = 100.0
 """From the eye at least, unless that is 200 m from the world's middle."""
-RIM_RAD = math.pi / 4.0
+_RIM_RAD = math.pi / 4.0
 """Below the horizon, before SKY_VERTEX lays it on the edge of the ground."""
 _SEED = 20210
 _ZENITH, _HORIZON = np.asarray((0.22, 0.45, 0.78)), np.asarray(shaders.HAZE)
@@ -41,7 +42,7 @@ class Sky:
 
     def draw(self, eye: Array, from_world: Array) -> None:
         """Draw it where nothing else was drawn."""
-        slope = max(float(eye[2]), 1.0) / GROUND_ENDS_M
+        slope = max(float(eye[2]), 1.0) / _GROUND_ENDS_M
         rays = np.linalg.solve(from_world[[0, 1, 3], :3], _CORNERS.T)
         # Steeper than a slope is a convex cone: it holds the whole picture if it holds its corners.
         if (rays[2] < -slope * np.hypot(rays[0], rays[1])).all():
@@ -58,7 +59,7 @@ def _dome() -> tuple[Array, Array]:
     near, far = (_ridge(generator, rise) for rise, _ in _HILLS)
     far = np.maximum(near, far)
     # Every corner of a ridge twice, below it and above it, for its edge to be sharp.
-    rings = [(np.full(SIDES, -RIM_RAD), near), (near, far)]
+    rings = [(np.full(SIDES, -_RIM_RAD), near), (near, far)]
     parts = [
         (rises, np.tile(colour, (SIDES, 1)))
         for edges, (_, colour) in zip(rings, _HILLS, strict=True)

@@ -140,7 +140,7 @@ def test_nothing_but_gravity_acts_on_a_body_that_falls() -> None:
 
 
 def messages_of(messages: list[tuple[str, Message]], topic: str) -> list[VehicleStatus]:
-    return [each for name, each in messages if name == topic]  # type: ignore[misc]
+    return [each for name, each in messages if name == topic]
 
 
 def test_pybullet_has_the_stated_weight_and_inertia() -> None:

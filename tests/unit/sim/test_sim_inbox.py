@@ -35,7 +35,7 @@ def test_in_order_and_the_least_goes_first(actions: list[CommandAction], depth: 
 def test_the_newest_sticks_are_obeyed_but_every_action() -> None:
     inbox = Inbox(64)
     for index, action in enumerate(("fly", "takeoff", "fly", "fly", "land", "fly")):
-        inbox.put(command(Sticks(vx=index / 10), action), index)  # type: ignore[arg-type]
+        inbox.put(command(Sticks(vx=index / 10), action), index)
     obeyed = [inbox.newest(since_ns=0) for _ in range(4)]
     assert [(each.action, each.vx) for each in obeyed if each] == [
         ("takeoff", 0.1),
@@ -53,7 +53,7 @@ def test_an_emergency_in_a_flood_of_sticks_is_obeyed() -> None:
     told: list[bytes] = []
     ears.subscribe(key_of("unit", "vehicle"), told.append)
     wire(node, Config(renderer="none", world="empty"))
-    orders = ears.publication(key_of("unit", "command"), None, "")  # type: ignore[arg-type]
+    orders = ears.publication(key_of("unit", "command"), None, "")
     orders.put(encode(command(action="emergency")))
     for _ in range(200):
         orders.put(encode(command(Sticks(vx=1.0))))

@@ -64,7 +64,7 @@ def test_a_file_that_is_no_vehicle_is_refused_by_name(name: str, folder: Path) -
     (folder / f"{name}.py").write_text(code)
     for settings in ({"plant": name}, {"vehicles": f"tum,{name}"}):
         with pytest.raises(ValueError, match=next(iter(settings))) as caught:
-            Config(**settings)  # type: ignore[arg-type]
+            Config(**settings)
         assert f"{folder / name}.py" in str(caught.value)
         assert said in str(caught.value)
         assert len(str(caught.value).splitlines()) == 1

@@ -34,11 +34,11 @@ def stage(config: Config) -> Iterator[tuple[Node, ManualClock, dict[str, list[by
 
 
 def flown(seed: int, renderer: str, duration_s: float) -> dict[str, list[bytes]]:
-    config = Config(seed=seed, clock="lockstep", renderer=renderer)  # type: ignore[arg-type]
+    config = Config(seed=seed, clock="lockstep", renderer=renderer)
     with stage(config) as (node, _, heard):
-        ask = MemoryBus(node.bus._network)  # type: ignore[attr-defined]
+        ask = MemoryBus(node.bus._network)
         key = key_of("unit", "command")
-        publication = ask.publication(key, None, "")  # type: ignore[arg-type]
+        publication = ask.publication(key, None, "")
         for count in range(round(duration_s * 50)):
             action = "takeoff" if count < 5 else "fly"
             publication.put(encode(command(Sticks(vx=0.3, wz=0.1), action)))
@@ -77,8 +77,8 @@ def test_a_reset_is_granted_while_it_waits() -> None:
 def test_pictures_noise_is_that_of_the_seed_which_a_reset_gives() -> None:
     config = Config(clock="lockstep", picture_noise=1.0, seed=4, wind_mps=3.0, exposure_s=0.01)
     with stage(config) as (node, _, heard):
-        ask = MemoryBus(node.bus._network)  # type: ignore[attr-defined]
-        orders = ask.publication(key_of("unit", "command"), None, "")  # type: ignore[arg-type]
+        ask = MemoryBus(node.bus._network)
+        orders = ask.publication(key_of("unit", "command"), None, "")
         reset = next(s.handler for s in node._servers if s.query.name == "sim/reset")
 
         def pictures(commands: int) -> list[bytes]:
@@ -108,12 +108,11 @@ def test_pictures_noise_is_that_of_the_seed_which_a_reset_gives() -> None:
 def test_no_action_is_lost_while_another_vehicle_is_silent() -> None:
     config = Config(clock="lockstep", renderer="none", vehicles="tum,second=tum", world="empty")
     with stage(config) as (node, clock, heard):
-        ask = MemoryBus(node.bus._network)  # type: ignore[attr-defined]
+        ask = MemoryBus(node.bus._network)
         told: list[bytes] = []
         ask.subscribe(key_of("unit", "vehicle"), told.append)
         first, second = (
-            ask.publication(key_of(name, "command"), None, "")  # type: ignore[arg-type]
-            for name in ("unit", "second")
+            ask.publication(key_of(name, "command"), None, "") for name in ("unit", "second")
         )
         for action in ["takeoff"] * 2 + ["fly"] * 98:
             first.put(encode(command(action=action)))
@@ -134,12 +133,11 @@ def test_no_action_is_lost_while_another_vehicle_is_silent() -> None:
 def test_with_several_vehicles_physics_waits_for_the_command_of_each() -> None:
     config = Config(clock="lockstep", renderer="none", vehicles="tum,mule=rover", world="empty")
     with stage(config) as (node, _, heard):
-        ask = MemoryBus(node.bus._network)  # type: ignore[attr-defined]
+        ask = MemoryBus(node.bus._network)
         mule: list[bytes] = []
         ask.subscribe(key_of("mule", "truth"), mule.append)
         first, second = (
-            ask.publication(key_of(name, "command"), None, "")  # type: ignore[arg-type]
-            for name in ("unit", "mule")
+            ask.publication(key_of(name, "command"), None, "") for name in ("unit", "mule")
         )
         for _ in range(5):
             first.put(encode(command(Sticks())))

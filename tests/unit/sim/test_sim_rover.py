@@ -128,7 +128,7 @@ def test_an_emergency_stops_it_within_the_grip_of_its_tyres_until_it_is_let_go()
 def test_take_off_and_landing_mean_nothing_to_it() -> None:
     simulation = standing()
     for action in ("takeoff", "land"):
-        fly(simulation, 0.5, action=action)  # type: ignore[arg-type]
+        fly(simulation, 0.5, action=action)
         assert simulation.status().state == "flying"
         assert simulation.state.position_m == pytest.approx((0.0, 0.0, REST_M), abs=1e-3)
     simulation.close()
@@ -187,15 +187,15 @@ def test_in_the_air_neither_sticks_nor_brakes_change_its_way(ledge: Simulation) 
 def test_tipped_over_an_edge_it_says_so_scrapes_to_a_halt_and_is_reset(ledge: Simulation) -> None:
     _, messages = fly(ledge, 5.0, Sticks(vx=1.0))
     told = [message for topic, message in messages if topic == "vehicle"]
-    states = [message.state for message in told]  # type: ignore[attr-defined]
+    states = [message.state for message in told]
     assert states[0] == "flying"
     assert states[-1] == "emergency"
-    assert told[-1].collisions >= 1  # type: ignore[attr-defined]
+    assert told[-1].collisions >= 1
     assert ledge.state.tilt_rad > 1.0
     assert math.hypot(*ledge.state.velocity_mps) < 0.01
     place = ledge.state.position_m
     for action in ("land", "takeoff", "fly"):
-        fly(ledge, 0.2, Sticks(vx=1.0), action=action)  # type: ignore[arg-type]
+        fly(ledge, 0.2, Sticks(vx=1.0), action=action)
     assert ledge.status().state == "emergency"
     assert ledge.state.position_m == pytest.approx(place, abs=0.01)
     status = ledge.reset(ResetRequest())

@@ -235,7 +235,7 @@ def test_a_world_whose_start_is_taken_is_refused(tmp_path: Path) -> None:
     # Who is told another place may go there.
     config = Config(world="empty")
     simulation = Simulation(config)
-    simulation.worlds = lambda: ["empty", str(file)]  # type: ignore[method-assign]
+    simulation.worlds = lambda: ["empty", str(file)]
     with pytest.raises(ResetError, match="`start`"):
         simulation.reset(ResetRequest(world=str(file)))
     assert simulation.status().world == "empty"
