@@ -49,6 +49,20 @@ def _variables_of(environment: Mapping[str, str], service: str) -> dict[str, str
     }
 
 
+def _fault_of(config_type: type, key: str, values: Mapping[str, Any]) -> str:
+    """What is wrong with a value among others, without its name; empty if nothing is."""
+    try:
+        checked: Any = msgspec.convert(values, config_type, strict=False)
+        if isinstance(number := getattr(checked, key), float) and not isfinite(number):
+            raise ValueError(f"{number} is no number to work with")
+    except (msgspec.ValidationError, ValueError) as error:
+        text = str(error).removesuffix(f" - at `$.{key}`")
+        for prefix in (f"{key}: ", f"{key} "):
+            text = text.removeprefix(prefix)
+        return text + _choices_of(config_type, key)
+    return ""
+
+
 def _choices_of(config_type: type, key: str) -> str:
     """What a field takes, if that can be counted."""
     kind = get_type_hints(config_type)[key]
@@ -88,7 +102,7 @@ def load(
     sources.append(("the command line", {k: v for k, v in (flags or {}).items() if v is not None}))
 
     known = {field.name for field in dataclasses.fields(config_type)}  # type: ignore[arg-type]
-    values: dict[str, Any] = {}
+    values = {key: value for _, given in sources for key, value in given.items()}
     for origin, given in sources:
         for key, value in given.items():
             if key not in known:
@@ -96,15 +110,11 @@ def load(
                     f"{service}: {origin} sets {key!r}, which is unknown;"
                     f" known are {', '.join(sorted(known))}"
                 )
-            try:
-                # Checked one by one, so that an error can say where the value came from.
-                checked = msgspec.convert({key: value}, config_type, strict=False)
-                if isinstance(number := getattr(checked, key), float) and not isfinite(number):
-                    raise ValueError(f"{number} is no number to work with")
-            except (msgspec.ValidationError, ValueError) as error:
-                text = f"{error}{_choices_of(config_type, key)}"
-                raise ConfigError(f"{service}: {origin} sets {key!r}: {text}") from None
-            values[key] = value
+            # Checked one by one, so that an error can say where the value came from; some are
+            # right only beside another one, as the ends of a range.
+            fault = _fault_of(config_type, key, {key: value})
+            if fault and _fault_of(config_type, key, {**values, key: value}):
+                raise ConfigError(f"{service}: {origin} sets {key!r}: {fault}")
     try:
         return msgspec.convert(values, config_type, strict=False)
     except (msgspec.ValidationError, ValueError) as error:

@@ -5,6 +5,7 @@ Lengths are in m, angles in degrees.
 
 import itertools
 import math
+import re
 from pathlib import Path as FilePath
 from typing import Annotated, get_args
 
@@ -84,7 +85,7 @@ class _IdealPath(_Read, frozen=True, kw_only=True):
 class _Fence(_Read, frozen=True, kw_only=True):
     height_m: _Length
     thickness_m: _Length = 0.05
-    panel_m: _Length = 2.5
+    panel_m: Annotated[float, Meta(ge=0.1, le=1000.0)] = 2.5
     texture: Texture = "fence"
 
 
@@ -130,6 +131,21 @@ class _File(_Read, frozen=True, kw_only=True):
     bodies: list[_Body] = []
 
 
+_PLACE = re.compile(r" - at `\$[^`]*\.(\w+)[^.`]*`$")
+"""The name of the field that msgspec's error is about."""
+_PARTS: dict[str, type[_Read]] = {
+    "": _File,
+    "start": _Start,
+    "ideal_path": _IdealPath,
+    "segments": _Segment,
+    "lane": _Lane,
+    "fence": _Fence,
+    "bodies": _Body,
+    "rows": _Row,
+    "ring": _Ring,
+}
+
+
 def names() -> list[str]:
     """The worlds that are shipped."""
     return sorted(path.stem for path in FOLDER.glob(f"*{SUFFIX}"))
@@ -163,10 +179,15 @@ def load_file(path: FilePath, name: str | None = None) -> World:
     """
     try:
         read = msgspec.yaml.decode(path.read_bytes(), type=_File)
-    except (OSError, ValueError, msgspec.DecodeError) as error:
+    except OSError as error:
+        raise WorldError(f"{path}: {error.strerror}") from None
+    except (ValueError, msgspec.DecodeError) as error:
         raise WorldError(f"{path}: {_line_of(error)}") from None
     if read.lane is not None and read.ideal_path is None:
         raise WorldError(f"{path}: `lane` needs an `ideal_path` to lie along")
+    number = sum(_number_of(each) for each in read.bodies)
+    if number > MAX_BODIES:
+        raise WorldError(f"{path}: `bodies` are {number}; {MAX_BODIES} at most")
     bodies = [body for each in read.bodies for body in _bodies(each)]
     strips: list[Strip] = []
     course: Path | None = None
@@ -197,11 +218,14 @@ def load_file(path: FilePath, name: str | None = None) -> World:
 
 
 def _line_of(error: Exception) -> str:
-    """What is wrong with a file, in one line."""
-    text = " ".join(str(error).split())
+    """What is wrong with a file, and what is allowed, in one line."""
+    text = " ".join(str(error).split()).replace('"<byte string>", ', "")
+    place = _PLACE.search(text)
+    field = place[1] if place else ""
     if text.startswith("Invalid enum value"):
-        field = text.rstrip("`").rpartition(".")[2]
         text = f"{text}; use {', '.join(get_args(_CHOICES[field]))}"
+    elif text.startswith("Object contains unknown field"):
+        text = f"{text}; use {', '.join(_PARTS[field].__struct_fields__)}"
     return text
 
 
@@ -234,6 +258,11 @@ def _fence(course: Path, read: _Lane) -> list[Body]:
     return lane.fence(
         course, read.width_m, fence.height_m, fence.thickness_m, fence.panel_m, fence.texture
     )
+
+
+def _number_of(read: _Body) -> int:
+    """In how many places a body stands."""
+    return math.prod(row.count for row in read.rows) * (read.ring.count if read.ring else 1)
 
 
 def _bodies(read: _Body) -> list[Body]:

@@ -16,10 +16,14 @@ class Example:
     loops: int = 3
     noisy: bool = True
     mode: Literal["slow", "fast"] = "slow"
+    least: int = 1
+    most: int = 5
 
     def __post_init__(self) -> None:
         if self.rate_hz <= 0:
             raise ValueError(f"rate_hz is {self.rate_hz}; use more than 0")
+        if self.least >= self.most:
+            raise ValueError("least: must be below most")
 
 
 def write(folder: Path, text: str) -> Path:
@@ -84,6 +88,21 @@ def test_a_bad_value_is_an_error_that_names_key_and_source(name: str, value: str
 def test_what_can_be_counted_is_named_with_the_error(name: str, allowed: str) -> None:
     with pytest.raises(ConfigError, match=f"{name}.*; use {allowed}$"):
         load(Example, "sim", environment={}, flags={name: "maybe"})
+
+
+@pytest.mark.parametrize("text", ["loops = 'many'", "rate_hz = 0", "mode = 'medium'", "least = 9"])
+def test_an_error_names_its_field_once(tmp_path: Path, text: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load(Example, "sim", write(tmp_path, f"[sim]\n{text}\n"), {})
+    assert str(caught.value).count(text.partition(" ")[0]) == 1
+
+
+def test_what_is_right_only_together_may_be_set_together(tmp_path: Path) -> None:
+    assert load(Example, "sim", environment={}, flags={"least": "7", "most": "9"}).least == 7
+    file = write(tmp_path, "[sim]\nleast = 7\n")
+    assert load(Example, "sim", file, {"AUTOCOMPLETE_SIM_MOST": "9"}).most == 9
+    with pytest.raises(ConfigError, match=r"system\.toml sets 'least': must be below most"):
+        load(Example, "sim", file, {"AUTOCOMPLETE_SIM_MOST": "6"})
 
 
 def test_a_bad_value_is_blamed_on_its_source_though_a_better_one_wins(tmp_path: Path) -> None:

@@ -76,7 +76,7 @@ def test_on_the_command_line_it_is_wrong_usage(
     (folder / "cart.py").write_text("")
     assert main(["run", "sim", "--plant", "cart"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "plant: " in line
+    assert "sets 'plant': " in line
     assert "cart.py: it has no PLANT; end it with PLANT = " in line
 
 

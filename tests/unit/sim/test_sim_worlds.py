@@ -209,6 +209,19 @@ def test_sampling_follows_an_arc_of_either_hand(tmp_path: Path) -> None:
         (": : [", "line 1, column"),
         ("description: a\nbodies: [1", "line 2, column"),
         ("description: a\nground: snow", "use asphalt, grass, concrete"),
+        ("description: a\ngrond: grass", "`grond`; use description, ground, start"),
+        (
+            "description: a\n"
+            "bodies: [{shape: box, size_m: [1, 1, 1], position_m: [0, 0, 0], texture: crate,"
+            " ring: {count: 2, center_m: [0, 0]}}]",
+            "`$.bodies[0].ring`; use count, centre_m",
+        ),
+        (
+            "description: a\n"
+            "bodies: [{shape: box, size_m: [1, 1, 1], position_m: [0, 0, 0], texture: crate,"
+            " rows: [{count: 1000, step_m: [2, 0, 0]}, {count: 1000, step_m: [0, 2, 0]}]}]",
+            "`bodies` are 1000000; 5000 at most",
+        ),
         ("description: a\nstart: {yaw_deg: .nan}", "yaw_deg"),
     ],
 )
