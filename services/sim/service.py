@@ -28,7 +28,7 @@ LOW_FACTOR = 0.95
 
 
 def check(config: Config, vehicle: str) -> None:
-    """See whether the vehicles can have the names that are asked for.
+    """See whether the vehicles can have the names that are asked for, and stand where they start.
 
     Raises:
         ValueError: if they cannot, which is wrong usage.
@@ -37,6 +37,10 @@ def check(config: Config, vehicle: str) -> None:
         names_of(crew_of(config.vehicles, config.plant), vehicle)
     except ValueError as error:
         raise ValueError(f"vehicles: {error}") from None
+    try:
+        Simulation(config).close()
+    except ResetError as error:
+        raise ValueError(f"{error.field}: {error}") from None
 
 
 def wire(node: Node, config: Config) -> None:
@@ -100,7 +104,9 @@ def wire(node: Node, config: Config) -> None:
             if other == index or simulation.world != before:
                 waiting.clear()
         if studio is not None:
-            studio.load(simulation.scene(), simulation.cameras())
+            studio.equip(simulation.cameras(), index)
+            if simulation.world != before:
+                studio.load(simulation.scene())
         return status
 
     def names_worlds(_request: m.WorldsRequest, _now_ns: int) -> m.WorldsReply:

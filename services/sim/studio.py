@@ -104,14 +104,19 @@ class Studio:
         self._thread = threading.Thread(target=self._run, name="studio", daemon=True)
         self._thread.start()
 
-    def load(self, scene: Scene, cameras: Iterable[Camera] | None = None) -> None:
-        """Take pictures of this scene from now on, by other cameras if there are any."""
+    def load(self, scene: Scene) -> None:
+        """Take pictures of this scene from now on."""
         with self._wake:
             self._scene = scene
-            if cameras is not None:
-                self._cameras = _by_owner(cameras)
             self._shots.clear()
             self._drawn_ns.clear()
+            self._wake.notify_all()
+
+    def equip(self, cameras: Iterable[Camera], vehicle: int) -> None:
+        """Take pictures by these cameras from now on; one vehicle's that wait are of its past."""
+        with self._wake:
+            self._cameras = _by_owner(cameras)
+            self._shots = [shot for shot in self._shots if shot.vehicle != vehicle]
             self._wake.notify_all()
 
     def take(self, shots: Sequence[Shot]) -> None:

@@ -1,6 +1,7 @@
 """Pictures are taken beside physics: old shots are dropped, what draws them is chosen openly."""
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -121,6 +122,27 @@ def test_no_camera_starves_where_not_all_pictures_can_be_drawn(
     drawn = taken[:periods]
     assert drawn.count("camera/front") > periods / 8
     assert drawn.count("camera/down") > periods / 3
+
+
+def test_what_waits_of_a_vehicle_that_is_reset_is_not_drawn_that_of_others_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    renderer = SlowRenderer()
+    monkeypatch.setattr(studio, "open_renderer", lambda _choice: renderer)
+    taken: list[tuple[int, int]] = []
+    fleet = (*CAMERAS, *cameras_of(Config(), 1))
+    cameras = studio.Studio("gl", fleet, 80, lambda s, _: taken.append((s.vehicle, s.stamp_ns)))
+    cameras.take(front_at(0))
+    assert renderer.drawing.wait(5.0)
+    for shot in (*down_at(1), *front_at(2)):
+        cameras.take((shot, replace(shot, vehicle=1)))
+    cameras.equip(fleet, 0)
+    cameras.take(down_at(3))
+    renderer.go_on.release(4)
+    cameras.finish()
+    cameras.close()
+    assert sorted(taken) == [(0, 0), (0, 3), (1, 1), (1, 2)]
+    assert not cameras.dropped
 
 
 def test_a_picture_that_cannot_be_published_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ from services.sim.cameras import Shot, cameras_of
 from services.sim.config import Config
 from services.sim.core import STEP_S, ResetError, Simulation
 from services.sim.renderer import GlRenderer, NoOpenGlError
+from services.sim.service import check
 from services.sim.stage import Stage
 
 
@@ -245,6 +246,9 @@ def test_a_world_whose_start_is_taken_is_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(ResetError, match=r"full\.yaml: something stands.*`start`"):
         Simulation(Config(world=str(file)))
+    # No network is needed to say so.
+    with pytest.raises(ValueError, match=r"^world: .*full\.yaml: something stands.*`start`$"):
+        check(Config(world=str(file)), "unit")
     # Who is told another place may go there.
     config = Config(world="empty")
     simulation = Simulation(config)
