@@ -25,7 +25,7 @@ class Build:
         hull: what collides, in body coordinates, whose origin is the centre of mass.
         look: what others see, in the same.
         friction: of its hull; pybullet multiplies it by that of what it touches.
-        friction_tipped: the same once it lies on its side or its back.
+        friction_tipped: the same once it lies on its side or its back; None is no other.
         front: where the front camera sits.
         down: where the camera that looks down sits.
         sensors: the topics of the instruments that it has.
@@ -36,7 +36,7 @@ class Build:
     hull: tuple[Body, ...]
     look: tuple[Body, ...]
     friction: float = 0.8
-    friction_tipped: float = 0.8
+    friction_tipped: float | None = None
     front: Mount = FRONT
     down: Mount = DOWN
     sensors: frozenset[str] = INSTRUMENTS

@@ -90,7 +90,8 @@ class Hull:
             **on,
         )
         self._leash_m = 0.0
-        self._frictions = (build.friction, build.friction_tipped)
+        tipped = build.friction_tipped
+        self._frictions = (build.friction, build.friction if tipped is None else tipped)
         self._is_tipped = False
 
     def remove(self) -> None:

@@ -93,7 +93,7 @@ def _fault_of_build(build: object) -> str:
             return f"build.{field}: the orientation of a body must be a quaternion of length 1"
     if not (build.mass_kg > 0.0 and all(each > 0.0 for each in build.inertia_kgm2)):
         return "build: mass_kg and inertia_kgm2 must be above 0"
-    if not (build.friction >= 0.0 and build.friction_tipped >= 0.0):
+    if not (build.friction >= 0.0 and (build.friction_tipped or 0.0) >= 0.0):
         return "build: friction and friction_tipped must be 0 or more"
     unknown = sorted(build.sensors - INSTRUMENTS)
     if unknown:

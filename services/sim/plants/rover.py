@@ -66,6 +66,7 @@ class RoverPlant(Plant):
             *(_wheel(x, y) for x in (-0.13, 0.13) for y in (-_HALF_TRACK_M, _HALF_TRACK_M)),
         ),
         friction=0.0,
+        friction_tipped=0.8,
     )
     flies: ClassVar[bool] = False
     life_s: ClassVar[float] = 4 * 3600.0

@@ -1,19 +1,26 @@
 """A vehicle is one file, here the one of the docs: listed, flown, and known to the autopilot."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pybullet
 import pytest
 from flights import fly
+from msgspec import structs
 
+import worlds
+from common.frames import quaternion_of
 from common.messages import ResetRequest
 from services.autopilot.config import Config as AutopilotConfig
 from services.autopilot.core import Autopilot
 from services.autopilot.plants import plant_of
 from services.sim import plants
-from services.sim.body import Sticks
+from services.sim.body import NO_LOADS, Sticks
+from services.sim.build import ARDRONE
 from services.sim.config import Config
 from services.sim.core import Simulation
+from services.sim.stage import Stage
 from studies.lockstep import HandsOff, Lockstep
 
 PAGE = Path(__file__).parents[3] / "docs" / "simulator.md"
@@ -50,6 +57,23 @@ def test_it_stands_beside_others_and_comes_by_a_reset(heavy: str) -> None:
     assert [actor.plant_name for actor in simulation.actors] == ["tum", heavy]
     assert simulation.reset(ResetRequest(plant=heavy, position=(3.0, 0.0, 0.0))).plant == heavy
     simulation.close()
+
+
+@pytest.mark.parametrize(("tipped", "friction"), [(None, 0.1), (0.6, 0.6)])
+def test_on_its_side_it_scrapes_as_it_does_upright_unless_it_says_otherwise(
+    tipped: float | None, friction: float
+) -> None:
+    stage = Stage(worlds.load("empty"), 0.005)
+    build = replace(ARDRONE, friction=0.1, friction_tipped=tipped)
+    hull = stage.add(build)
+    hull.place((0.0, 0.0, 1.0), 0.0)
+    upright = hull.state()
+    on_its_side = quaternion_of(1.5, 0.0, 0.0)
+    for orientation, expected in ((upright.orientation, 0.1), (on_its_side, friction)):
+        hull.restore(structs.replace(upright, orientation=orientation))
+        hull.push(NO_LOADS, hull.state())
+        assert pybullet.getDynamicsInfo(hull._body, -1, stage.client)[1] == expected
+    stage.close()
 
 
 def test_the_autopilot_holds_its_place_by_what_it_says_of_itself(heavy: str) -> None:
