@@ -99,7 +99,7 @@ class Studio:
         self._encoding: Counter[Lens] = Counter()
         self._drawn_ns: dict[tuple[int, str], int] = {}
         self.dropped: Counter[str] = Counter()
-        self.renderer = "starting"
+        self.renderer = "a renderer that is being opened"
         self.failure = ""
         self._thread = threading.Thread(target=self._run, name="studio", daemon=True)
         self._thread.start()
@@ -146,6 +146,7 @@ class Studio:
         # More threads would only take turns with physics and with other services.
         cv2.setNumThreads(1)
         try:
+            log.info("opening what draws; there are no pictures before")
             renderer = open_renderer(self._choice)
             self.renderer = renderer.name
             log.info("pictures are drawn by %s", renderer.name)
