@@ -18,6 +18,7 @@ from services.sim import shaders
 from services.sim.bodies import Bodies
 from services.sim.cameras import Camera, Shot
 from services.sim.ground import Ground
+from services.sim.shade import Shade
 from services.sim.sky import Sky
 from services.sim.stage import Scene
 from services.sim.textures import PIXELS, Picture, paint
@@ -60,11 +61,13 @@ class GlRenderer:
         self._textures, extent_m = _textures_of(gl, layers)
         self._bodies = Bodies(gl, layers, extent_m)
         self._ground = Ground(gl, layers, extent_m)
+        self._shade = Shade(gl)
         self._sky = Sky(gl)
         self._programs = (
             *self._bodies.programs,
             self._ground.textured,
             self._ground.painted,
+            self._shade.program,
             self._sky.program,
         )
         self._targets: dict[Lens, _Target] = {}
@@ -83,6 +86,7 @@ class GlRenderer:
             self._bodies.cast_shadows(window)
 
         self._ground.load(scene, cast_shadows)
+        self._shade.load(scene)
 
     def draw(self, camera: Camera, shot: Shot) -> Picture:
         """The picture (height, width, 3) in BGR; overwritten by the next but one of this lens."""
@@ -105,6 +109,7 @@ class GlRenderer:
         self._sky.draw(eye, from_world)
         gl.depth_func = "<"
         gl.enable(moderngl.CULL_FACE | moderngl.BLEND)
+        self._shade.draw(shot.others, from_world)
         self._bodies.draw_nets(away_m)
         self._finish()
         return target.read()

@@ -11,9 +11,10 @@ import pytest
 
 from common.camera import DOWN, FRONT, Lens, Mount, project, to_optical
 from common.frames import quaternion_of, rotation_of
-from services.sim.cameras import Camera, Shot
+from services.sim.cameras import Camera, Figure, Shot
 from services.sim.optics import Renderer
 from services.sim.renderer import GlRenderer, NoOpenGlError, jpeg_of
+from services.sim.shaders import SUN
 from services.sim.stage import Scene, Stage
 from services.sim.tiny import TinyRenderer
 from worlds import Body, Texture, World, load
@@ -148,6 +149,35 @@ def test_a_ball_is_seen_where_the_lens_projects_it(
     pixel = project(optical, LENS)[0][0]
     # Pixel centres are whole numbers, as in OpenCV.
     assert (columns.mean(), rows.mean()) == pytest.approx(tuple(pixel), abs=0.6)
+
+
+@pytest.mark.parametrize("height_m", [1.0, 2.0])
+def test_a_vehicles_shade_lies_where_the_shadow_of_a_thing_in_its_place_would(
+    gl: Renderer, height_m: float
+) -> None:
+    disc = Body("cylinder", (0.6, 0.6, 0.05), (0.0, 0.0, 0.0), UPRIGHT, "crate")
+    place = (0.4, -0.3, height_m)
+    sun_x, sun_y, sun_z = SUN
+    # Right above the shadow.
+    x, y = 0.4 - sun_x / sun_z * height_m, -0.3 - sun_y / sun_z * height_m
+    shot = shot_at((x, y, 4.0), 0.0, 0.0, 0.2)
+    camera = Camera("camera/down", LENS, DOWN, 60.0)
+
+    def light(bodies: tuple[Body, ...], others: tuple[Figure, ...]) -> np.ndarray:
+        stage = Stage(replace(world_of("crate"), bodies=bodies), 0.001)
+        gl.load(stage.scene())
+        stage.close()
+        middle = gl.draw(camera, replace(shot, others=others))[140:220, 280:360]
+        return np.asarray(middle.astype(float).sum(axis=2))
+
+    bare = light((), ())
+    cast = (
+        light((), (Figure((disc,), place, UPRIGHT),)),
+        light((replace(disc, position_m=place),), ()),
+    )
+    spot, shadow = (np.argwhere(each < 0.85 * bare) for each in cast)
+    assert spot.mean(axis=0) == pytest.approx(shadow.mean(axis=0), abs=1.0)
+    assert 0.7 < len(spot) / len(shadow) < 1.0
 
 
 def test_the_ground_of_the_track_has_corners_everywhere(gl: Renderer) -> None:

@@ -1,0 +1,105 @@
+"""The shade of vehicles on the ground: a soft spot each, where the sun throws it.
+
+So people see how high another vehicle flies. What stands in the world casts its true shadow once,
+see ground.py; that of a vehicle moves, and a spot is all that costs next to nothing.
+"""
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from common.frames import Array
+from services.sim import shaders
+from services.sim.body import Vector3
+from services.sim.cameras import Figure
+from services.sim.crew import MOST
+from services.sim.ground import PAINT_M
+from services.sim.stage import Scene
+from worlds import Body
+
+DARKNESS = 0.5
+"""In its middle, as in the shadow of what stands there."""
+_VERTEX = f"""
+#version 330
+uniform mat4 from_world;
+uniform float height_m;
+in vec3 spot;
+out vec2 off; out float darkest;
+void main() {{
+    // Wound so that it is seen from above.
+    off = vec2(gl_VertexID % 2, gl_VertexID / 2) * 2.0 - 1.0;
+    gl_Position = from_world * vec4(spot.xy + off * spot.z, height_m, 1.0);
+    darkest = {DARKNESS} / (1.0 + {shaders.HAZE_PER_M} * gl_Position.w);
+}}
+"""
+_FRAGMENT = """
+#version 330
+in vec2 off; in float darkest;
+out vec4 bgra;
+void main() { bgra = vec4(0.0, 0.0, 0.0, darkest * min(2.0 - 2.0 * dot(off, off), 1.0)); }
+"""
+
+
+class Shade:
+    """The spots of vehicles.
+
+    Args:
+        gl: where they are drawn.
+    """
+
+    def __init__(self, gl: Any) -> None:
+        self.program = gl.program(_VERTEX, _FRAGMENT)
+        self._spots = gl.buffer(reserve=MOST * 3 * 4, dynamic=True)
+        self._vertices = gl.vertex_array(self.program, [(self._spots, "3f/i", "spot")])
+
+    def load(self, scene: Scene) -> None:
+        """Lie on the paint of this scene from now on."""
+        self.program["height_m"] = PAINT_M * (len(scene.strips) + 1)
+
+    def draw(self, figures: Sequence[Figure], from_world: Array) -> None:
+        """Draw those of these vehicles that are in sight.
+
+        The ground and what stands on it are drawn already, and blending is on.
+
+        Args:
+            figures: vehicles; the camera's own is none of them.
+            from_world: to clip coordinates, (4, 4).
+        """
+        if not figures:
+            return
+        rows = from_world[[0, 1, 3]].tolist()
+        spots = [spot for spot in map(_spot_of, figures) if _is_in_sight(spot, rows)]
+        if spots:
+            self._spots.write(np.asarray(spots, "f4").tobytes())
+            self._vertices.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(spots))
+
+
+def _spot_of(figure: Figure) -> Vector3:
+    """Its middle (x, y) on the ground, and its radius."""
+    x, y, z = figure.position_m
+    east, north, up = shaders.SUN
+    high = max(z, 0.0) / up
+    return x - east * high, y - north * high, _radius_m(figure.look)
+
+
+def _is_in_sight(spot: Vector3, rows: list[list[float]]) -> bool:
+    """Whether it may be: to draw one that is not costs 50 us.
+
+    Args:
+        spot: its middle (x, y) and its radius.
+        rows: those of `from_world` that make x, y and w of clip coordinates.
+    """
+    x, y, radius_m = spot
+    (across, off_across), (down, off_down), (w, off_w) = (
+        (row[0] * x + row[1] * y + row[3], radius_m * math.hypot(*row[:3])) for row in rows
+    )
+    return abs(across) < w + off_across + off_w and abs(down) < w + off_down + off_w
+
+
+@lru_cache(maxsize=16)
+def _radius_m(look: tuple[Body, ...]) -> float:
+    return max(math.hypot(*body.position_m[:2]) + max(body.size_m[:2]) / 2.0 for body in look)
