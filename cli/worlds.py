@@ -74,7 +74,10 @@ def _draw(chosen: list[worlds.World], folder: Path) -> None:
     from services.sim.portrait import plan_of, view_of_world
     from services.sim.studio import open_renderer
 
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"--draw: {folder}: {error.strerror}") from None
     renderer = open_renderer("auto")
     try:
         for world in chosen:

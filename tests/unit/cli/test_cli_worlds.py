@@ -41,3 +41,12 @@ def test_an_unknown_world_is_one_line(capsys: pytest.CaptureFixture[str]) -> Non
     said = capsys.readouterr().err
     assert "nowhere" in said
     assert len(said.strip().splitlines()) == 1
+
+
+def test_a_folder_that_cannot_be_made_is_one_line_that_names_the_flag(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    assert main(["worlds", "empty", "--draw", str(tmp_path / "file")]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"--draw: {tmp_path / 'file'}: File exists" in line
