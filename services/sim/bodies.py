@@ -1,5 +1,6 @@
-"""Bodies that are drawn as instances: one draw a shape and kind, of what is in sight."""
+"""Bodies that are drawn as instances: one draw a shape and texture, of what is in sight."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -8,14 +9,16 @@ import numpy as np
 
 from common.frames import Array
 from services.sim import meshes, shaders
+from services.sim.textures import paint
 from worlds import Body, Texture
 
 NET: Texture = "fence"
 """It has holes, and is drawn last."""
 MOST_FIGURES = 256
 """Bodies of vehicles of one shape that are drawn at once."""
-_COLUMNS = 11
-_LAYOUT = "3f 4f 3f 1f/i"
+_COLUMNS = 12
+_LAYOUT = "3f 4f 3f 2f/i"
+_PLACEMENT = ("at", "turn", "size", "repeat_m")
 _SIDES = np.asarray([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
 
 
@@ -24,18 +27,15 @@ class Bodies:
 
     Args:
         gl: where they are drawn.
-        layers: the layer of each texture.
-        extent_m: what one repetition of each layer measures, (N, 2).
+        textures: what they are made of.
     """
 
-    def __init__(self, gl: Any, layers: dict[Texture, int], extent_m: Array) -> None:
+    def __init__(self, gl: Any, textures: dict[Texture, Any]) -> None:
         self._gl = gl
-        self._layers = layers
+        self._textures = textures
         self._opaque = gl.program(shaders.BODY_VERTEX, shaders.BODY_FRAGMENT)
         self._net = gl.program(shaders.BODY_VERTEX, shaders.NET_FRAGMENT)
         self._shadow_program = gl.program(shaders.SHADOW_VERTEX, shaders.SHADOW_FRAGMENT)
-        for program in (*self.programs, self._shadow_program):
-            program["extent"] = [tuple(each) for each in extent_m]
         self._meshes = {
             "box": gl.buffer(meshes.box().tobytes()),
             "cylinder": gl.buffer(meshes.cylinder().tobytes()),
@@ -61,32 +61,28 @@ class Bodies:
         self._nets: list[_Flock] = []
         tables = [np.empty((0, _COLUMNS), "f4")]
         begin = 0
-        for flocks, program in ((self._flocks, self._opaque), (self._nets, self._net)):
-            for shape in self._meshes:
-                alike = [
-                    body
-                    for body in bodies
-                    if body.shape == shape and (body.texture == NET) == (flocks is self._nets)
-                ]
-                if not alike:
-                    continue
-                table = self._table(alike)
-                buffer = self._gl.buffer(table.tobytes(), dynamic=True)
-                drawn = self._drawn(program, shape, buffer)
-                shadow = self._shadowing(shape, buffer)
-                rows = slice(begin, begin + len(table))
-                flocks.append(_Flock(table, rows, buffer, drawn, shadow))
-                self._scene_objects += [drawn, shadow, buffer]
-                tables.append(table)
-                begin += len(table)
+        for (shape, texture), alike in _kinds_of(bodies).items():
+            flocks, program = (
+                (self._nets, self._net) if texture == NET else (self._flocks, self._opaque)
+            )
+            table = _table(alike)
+            buffer = self._gl.buffer(table.tobytes(), dynamic=True)
+            drawn = self._drawn(program, shape, buffer)
+            shadow = self._shadowing(shape, buffer)
+            rows = slice(begin, begin + len(table))
+            flocks.append(_Flock(table, rows, self._textures[texture], buffer, drawn, shadow))
+            self._scene_objects += [drawn, shadow, buffer]
+            tables.append(table)
+            begin += len(table)
         whole = np.concatenate(tables).astype(np.float64)
         self._centres_m = whole[:, :3]
         self._radii_m = 0.5 * np.linalg.norm(whole[:, 7:10], axis=1)
 
     def cast_shadows(self, window: Array) -> None:
-        """Draw the shadows into a window of the ground; the textures are in use at place 0."""
+        """Draw the shadows into a window of the ground."""
         self._shadow_program["window"] = tuple(window)
         for flock in self._flocks + self._nets:
+            flock.skin.use(0)
             flock.shadow.render(instances=len(flock.table))
 
     def look(self, eye: Array, from_world: Array) -> Array:
@@ -107,12 +103,13 @@ class Bodies:
         """
         for flock in self._flocks:
             flock.draw(away_m, 1)
-        for shape, (buffer, vertices) in self._figures.items():
-            alike = [body for body in figures if body.shape == shape]
+        for (shape, texture), alike in _kinds_of(figures).items():
+            buffer, vertices = self._figures[shape]
+            self._textures[texture].use(0)
             for begin in range(0, len(alike), MOST_FIGURES):
                 some = alike[begin : begin + MOST_FIGURES]
                 buffer.orphan()
-                buffer.write(self._table(some).tobytes())
+                buffer.write(_table(some).tobytes())
                 vertices.render(instances=len(some))
 
     def draw_nets(self, away_m: Array) -> None:
@@ -120,21 +117,13 @@ class Bodies:
         for net in self._nets:
             net.draw(away_m, -1)
 
-    def _table(self, bodies: Sequence[Body]) -> Array:
-        """One row a body: place, turn, size, layer."""
-        rows = [
-            (*body.position_m, *body.orientation, *body.size_m, self._layers[body.texture])
-            for body in bodies
-        ]
-        return np.asarray(rows, "f4").reshape(-1, _COLUMNS)
-
     def _drawn(self, program: Any, shape: str, table: Any) -> Any:
         names = ("in_position", "in_normal", "in_uv", "in_across", "in_up")
         return self._gl.vertex_array(
             program,
             [
                 (self._meshes[shape], "3f 3f 2f 3f 3f", *names),
-                (table, _LAYOUT, "at", "turn", "size", "layer"),
+                (table, _LAYOUT, *_PLACEMENT),
             ],
         )
 
@@ -144,18 +133,19 @@ class Bodies:
             self._shadow_program,
             [
                 (self._meshes[shape], "3f 3x4 2f 3f 3f", *names),
-                (table, _LAYOUT, "at", "turn", "size", "layer"),
+                (table, _LAYOUT, *_PLACEMENT),
             ],
         )
 
 
 @dataclass(frozen=True, eq=False)
 class _Flock:
-    """Bodies of one shape, drawn at once: a row of the table each, and its copy in OpenGL.
+    """Bodies of one kind, drawn at once: a row of the table each, and its copy in OpenGL.
 
     Attributes:
-        table: see `Bodies._table`.
+        table: see `_table`.
         rows: which of all bodies they are.
+        skin: their texture.
         buffer: the table's copy.
         vertices: draws it.
         shadow: draws its shadows.
@@ -163,6 +153,7 @@ class _Flock:
 
     table: Array
     rows: slice
+    skin: Any
     buffer: Any
     vertices: Any
     shadow: Any
@@ -173,4 +164,23 @@ class _Flock:
         nearest = np.argsort(away_m)[: np.count_nonzero(np.isfinite(away_m))]
         if len(nearest):
             self.buffer.write(self.table[nearest[::order]].tobytes())
+            self.skin.use(0)
             self.vertices.render(instances=len(nearest))
+
+
+def _kinds_of(bodies: Sequence[Body]) -> dict[tuple[str, Texture], list[Body]]:
+    """Bodies by shape and texture."""
+    kinds: dict[tuple[str, Texture], list[Body]] = defaultdict(list)
+    for body in bodies:
+        kinds[body.shape, body.texture].append(body)
+    return kinds
+
+
+def _table(bodies: Sequence[Body]) -> Array:
+    """One row a body: place, turn, size, and what one repetition of its texture measures."""
+    rows = []
+    for body in bodies:
+        look = paint(body.texture)
+        repeat_m = (look.width_m or 0.0, look.height_m or 0.0)
+        rows.append((*body.position_m, *body.orientation, *body.size_m, *repeat_m))
+    return np.asarray(rows, "f4").reshape(-1, _COLUMNS)

@@ -9,7 +9,7 @@ import numpy as np
 from common.frames import Array
 from services.sim import meshes, shaders
 from services.sim.stage import Scene
-from services.sim.textures import patches
+from services.sim.textures import paint, patches
 from worlds import Strip, Texture
 
 PAINT_M = 0.003
@@ -19,19 +19,21 @@ LIGHT_PIXELS = 2048
 """2 to 3 cm each where a world is 60 m wide, so that the nearest one is enough: to blend four costs
 a quarter of the ground, and more of them no longer fit in a cache."""
 
+_Layer = tuple[Any, Any, Any, dict[str, Any]]
+"""Of the ground: what draws it, its vertices, its texture if it has one, its uniforms."""
+
 
 class Ground:
     """A plane with layers of paint, in the light of the sun.
 
     Args:
         gl: where it is drawn.
-        layers: the layer of each texture.
-        extent_m: what one repetition of each layer measures, (N, 2).
+        textures: what it is made of.
     """
 
-    def __init__(self, gl: Any, layers: dict[Texture, int], extent_m: Array) -> None:
+    def __init__(self, gl: Any, textures: dict[Texture, Any]) -> None:
         self._gl = gl
-        self._layers, self._extent_m = layers, extent_m
+        self._textures = textures
         self.textured = gl.program(shaders.GROUND_VERTEX, shaders.GROUND_FRAGMENT)
         self.painted = gl.program(shaders.PAINT_VERTEX, shaders.PAINT_FRAGMENT)
         for program in (self.textured, self.painted):
@@ -71,10 +73,12 @@ class Ground:
         self._layers_down = [(PAINT_M * up, each) for up, each in enumerate(layers_up)][::-1]
 
     def draw(self) -> None:
-        """Draw it; the textures are in use at place 0."""
+        """Draw it."""
         self._light.use(1)
-        for height_m, (program, vertices, look) in self._layers_down:
+        for height_m, (program, vertices, paving, look) in self._layers_down:
             program["height_m"] = height_m
+            if paving is not None:
+                paving.use(0)
             for name, value in look.items():
                 program[name] = value
             vertices.render(moderngl.TRIANGLE_STRIP)
@@ -102,20 +106,20 @@ class Ground:
             program["window"] = tuple(window)
         self._scene_objects.append(self._light)
 
-    def _laid(self, points: Array, texture: Texture) -> tuple[Any, Any, dict[str, Any]]:
+    def _laid(self, points: Array, texture: Texture) -> _Layer:
         """A layer of a texture, which lies flat on the world: it bends and stretches nowhere."""
-        layer = self._layers[texture]
-        step_m = np.where(self._extent_m[layer] > 0.0, self._extent_m[layer], 1.0)
+        painted = paint(texture)
+        per_m = (1.0 / (painted.width_m or 1.0), 1.0 / (painted.height_m or 1.0))
         vertices = self._vertices(self.textured, points, "2f", "in_position")
-        return self.textured, vertices, {"layer": layer, "per_m": tuple(1.0 / step_m)}
+        return self.textured, vertices, self._textures[texture], {"per_m": per_m}
 
-    def _dabbed(
-        self, points: Array, along_m: Array, strip: Strip
-    ) -> tuple[Any, Any, dict[str, Any]]:
+    def _dabbed(self, points: Array, along_m: Array, strip: Strip) -> _Layer:
         """A layer of plain paint."""
         data = np.hstack([points, along_m[:, :1]])
         vertices = self._vertices(self.painted, data, "2f 1f", "in_position", "in_along_m")
-        return self.painted, vertices, {"tint": strip.colour, "dash_m": strip.dash_m or 0.0}
+        dashes_per_m = 0.5 / strip.dash_m if strip.dash_m else 0.0
+        look = {"tint": strip.colour, "dashes_per_m": dashes_per_m}
+        return self.painted, vertices, None, look
 
     def _vertices(self, program: Any, data: Array, layout: str, *names: str) -> Any:
         buffer = self._gl.buffer(data.astype("f4").tobytes())

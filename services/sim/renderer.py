@@ -57,10 +57,10 @@ class GlRenderer:
         gl = self._gl
         # Rows are drawn top first, which mirrors the winding.
         gl.front_face = "cw"
-        layers: dict[Texture, int] = {each: index for index, each in enumerate(get_args(Texture))}
-        self._textures, extent_m = _textures_of(gl, layers)
-        self._bodies = Bodies(gl, layers, extent_m)
-        self._ground = Ground(gl, layers, extent_m)
+        # All of them, so that another world is there at once.
+        textures: dict[Texture, Any] = {each: _texture_of(gl, each) for each in get_args(Texture)}
+        self._bodies = Bodies(gl, textures)
+        self._ground = Ground(gl, textures)
         self._shade = Shade(gl)
         self._sky = Sky(gl)
         self._programs = (
@@ -80,12 +80,7 @@ class GlRenderer:
     def load(self, scene: Scene) -> None:
         """Draw this scene from now on."""
         self._bodies.load(scene.bodies)
-
-        def cast_shadows(window: Array) -> None:
-            self._textures.use(0)
-            self._bodies.cast_shadows(window)
-
-        self._ground.load(scene, cast_shadows)
+        self._ground.load(scene, self._bodies.cast_shadows)
         self._shade.load(scene)
 
     def draw(self, camera: Camera, shot: Shot) -> Picture:
@@ -99,7 +94,6 @@ class GlRenderer:
         gl.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         for program in self._programs:
             program["from_world"] = tuple(from_world.T.ravel())
-        self._textures.use(0)
         away_m = self._bodies.look(eye, from_world)
         figures = [body for other in shot.others for body in other.bodies()]
         self._bodies.draw_opaque(away_m, figures)
@@ -144,18 +138,13 @@ class _Target:
         return self._pictures[0]
 
 
-def _textures_of(gl: Any, layers: dict[Texture, int]) -> tuple[Any, Array]:
-    """All textures, so that another world is there at once; what they measure (MAX_LAYERS, 2)."""
-    paints = [paint(texture) for texture in layers]
+def _texture_of(gl: Any, texture: Texture) -> Any:
     # OpenGL's first row is the lowest.
-    data = np.stack([each.picture[::-1] for each in paints])
-    textures = gl.texture_array((PIXELS, PIXELS, len(paints)), 4, data.tobytes())
-    textures.build_mipmaps()
-    textures.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
-    extent_m = np.zeros((shaders.MAX_LAYERS, 2))
-    for index, each in enumerate(paints):
-        extent_m[index] = (each.width_m or 0.0, each.height_m or 0.0)
-    return textures, extent_m
+    data = paint(texture).picture[::-1].tobytes()
+    made = gl.texture((PIXELS, PIXELS), 4, data)
+    made.build_mipmaps()
+    made.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
+    return made
 
 
 def view_of(camera: Camera, shot: Shot) -> tuple[Array, Array, Array]:
