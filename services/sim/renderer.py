@@ -67,7 +67,6 @@ class GlRenderer:
             *self._bodies.programs,
             self._ground.textured,
             self._ground.painted,
-            self._shade.program,
             self._sky.program,
         )
         self._targets: dict[Lens, _Target] = {}

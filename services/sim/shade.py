@@ -52,13 +52,13 @@ class Shade:
     """
 
     def __init__(self, gl: Any) -> None:
-        self.program = gl.program(_VERTEX, _FRAGMENT)
+        self._program = gl.program(_VERTEX, _FRAGMENT)
         self._spots = gl.buffer(reserve=MOST * 3 * 4, dynamic=True)
-        self._vertices = gl.vertex_array(self.program, [(self._spots, "3f/i", "spot")])
+        self._vertices = gl.vertex_array(self._program, [(self._spots, "3f/i", "spot")])
 
     def load(self, scene: Scene) -> None:
         """Lie on the paint of this scene from now on."""
-        self.program["height_m"] = PAINT_M * (len(scene.strips) + 1)
+        self._program["height_m"] = PAINT_M * (len(scene.strips) + 1)
 
     def draw(self, figures: Sequence[Figure], from_world: Array) -> None:
         """Draw those of these vehicles that are in sight.
@@ -71,9 +71,9 @@ class Shade:
         """
         if not figures:
             return
-        rows = from_world[[0, 1, 3]].tolist()
-        spots = [spot for spot in map(_spot_of, figures) if _is_in_sight(spot, rows)]
+        spots = _in_sight([_spot_of(figure) for figure in figures], from_world)
         if spots:
+            self._program["from_world"] = tuple(from_world.T.ravel())
             self._spots.write(np.asarray(spots, "f4").tobytes())
             self._vertices.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(spots))
 
@@ -86,18 +86,21 @@ def _spot_of(figure: Figure) -> Vector3:
     return x - east * high, y - north * high, _radius_m(figure.look)
 
 
-def _is_in_sight(spot: Vector3, rows: list[list[float]]) -> bool:
-    """Whether it may be: to draw one that is not costs 50 us.
-
-    Args:
-        spot: its middle (x, y) and its radius.
-        rows: those of `from_world` that make x, y and w of clip coordinates.
-    """
-    x, y, radius_m = spot
-    (across, off_across), (down, off_down), (w, off_w) = (
-        (row[0] * x + row[1] * y + row[3], radius_m * math.hypot(*row[:3])) for row in rows
-    )
-    return abs(across) < w + off_across + off_w and abs(down) < w + off_down + off_w
+def _in_sight(spots: list[Vector3], from_world: Array) -> list[Vector3]:
+    """Those that may be: to draw one that is not costs 50 us, to ask 1 us."""
+    (ax, ay, az, a0), (bx, by, bz, b0), _, (wx, wy, wz, w0) = from_world.tolist()
+    # How much farther from the middle of the view a metre around a place may reach.
+    wide, high = math.hypot(ax, ay, az), math.hypot(bx, by, bz)
+    deep = math.hypot(wx, wy, wz)
+    seen = []
+    for x, y, radius_m in spots:
+        edge = wx * x + wy * y + w0 + deep * radius_m
+        if (
+            abs(ax * x + ay * y + a0) < edge + wide * radius_m
+            and abs(bx * x + by * y + b0) < edge + high * radius_m
+        ):
+            seen.append((x, y, radius_m))
+    return seen
 
 
 @lru_cache(maxsize=16)
