@@ -3,19 +3,30 @@
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from common.frames import Array
 from services.sim import meshes, shaders
 from services.sim.textures import paint
-from worlds import Body, Texture
+from worlds import Body, Shape, Texture
 
 NET: Texture = "fence"
 """It has holes, and is drawn last."""
 MOST_FIGURES = 256
 """Bodies of vehicles of one shape that are drawn at once."""
+_FORMS = {
+    "box": meshes.box(),
+    "cylinder": meshes.cylinder(12),
+    "sphere": meshes.sphere(10),
+    # Their corners stand out by as much as their sides fall short.
+    "far cylinder": meshes.cylinder(6, 0.536),
+    "far sphere": meshes.sphere(6, 0.509),
+}
+_FAR = {"cylinder": ("far cylinder", 10.0), "sphere": ("far sphere", 50.0)}
+"""What a shape is drawn as where it is narrower than so many pixels: it is off by half a one at
+most, and small triangles cost more than what is in them."""
 _COLUMNS = 12
 _LAYOUT = "3f 4f 3f 2f/i"
 _PLACEMENT = ("at", "turn", "size", "repeat_m")
@@ -36,13 +47,12 @@ class Bodies:
         self._opaque = gl.program(shaders.BODY_VERTEX, shaders.BODY_FRAGMENT)
         self._net = gl.program(shaders.BODY_VERTEX, shaders.NET_FRAGMENT)
         self._shadow_program = gl.program(shaders.SHADOW_VERTEX, shaders.SHADOW_FRAGMENT)
-        self._meshes = {
-            "box": gl.buffer(meshes.box().tobytes()),
-            "cylinder": gl.buffer(meshes.cylinder().tobytes()),
-            "sphere": gl.buffer(meshes.sphere().tobytes()),
-        }
+        self._meshes: dict[str, tuple[Any, Any]] = {}
+        for form, mesh in _FORMS.items():
+            corners, triangles = meshes.indexed(mesh)
+            self._meshes[form] = gl.buffer(corners.tobytes()), gl.buffer(triangles.tobytes())
         self._figures = {}
-        for shape in self._meshes:
+        for shape in get_args(Shape):
             buffer = gl.buffer(reserve=MOST_FIGURES * _COLUMNS * 4, dynamic=True)
             self._figures[shape] = (buffer, self._drawn(self._opaque, shape, buffer))
         self._scene_objects: list[Any] = []
@@ -67,11 +77,14 @@ class Bodies:
             )
             table = _table(alike)
             buffer = self._gl.buffer(table.tobytes(), dynamic=True)
-            drawn = self._drawn(program, shape, buffer)
+            near = self._drawn(program, shape, buffer)
+            far_form, fine_px = _FAR.get(shape, (shape, 0.0))
+            far = self._drawn(program, far_form, buffer)
             shadow = self._shadowing(shape, buffer)
             rows = slice(begin, begin + len(table))
-            flocks.append(_Flock(table, rows, self._textures[texture], buffer, drawn, shadow))
-            self._scene_objects += [drawn, shadow, buffer]
+            skin = self._textures[texture]
+            flocks.append(_Flock(table, rows, skin, buffer, near, far, fine_px, shadow))
+            self._scene_objects += [near, far, shadow, buffer]
             tables.append(table)
             begin += len(table)
         whole = np.concatenate(tables).astype(np.float64)
@@ -94,15 +107,16 @@ class Bodies:
         seen = (inside > -self._radii_m[:, None]).all(axis=1)
         return np.where(seen, np.linalg.norm(self._centres_m - eye, axis=1), np.inf)
 
-    def draw_opaque(self, away_m: Array, figures: Sequence[Body]) -> None:
+    def draw_opaque(self, away_m: Array, focal_px: float, figures: Sequence[Body]) -> None:
         """Draw what has no holes, near to far, so that what is hidden is not painted.
 
         Args:
             away_m: of each body, see `look`.
+            focal_px: the camera's focal length.
             figures: bodies that move; they cast no shadows.
         """
         for flock in self._flocks:
-            flock.draw(away_m, 1)
+            flock.draw(away_m, focal_px, 1)
         for (shape, texture), alike in _kinds_of(figures).items():
             buffer, vertices = self._figures[shape]
             self._textures[texture].use(0)
@@ -112,30 +126,24 @@ class Bodies:
                 buffer.write(_table(some).tobytes())
                 vertices.render(instances=len(some))
 
-    def draw_nets(self, away_m: Array) -> None:
+    def draw_nets(self, away_m: Array, focal_px: float) -> None:
         """Draw the nets, far to near, so that they are seen through each other."""
         for net in self._nets:
-            net.draw(away_m, -1)
+            net.draw(away_m, focal_px, -1)
 
-    def _drawn(self, program: Any, shape: str, table: Any) -> Any:
+    def _drawn(self, program: Any, form: str, table: Any) -> Any:
         names = ("in_position", "in_normal", "in_uv", "in_across", "in_up")
-        return self._gl.vertex_array(
-            program,
-            [
-                (self._meshes[shape], "3f 3f 2f 3f 3f", *names),
-                (table, _LAYOUT, *_PLACEMENT),
-            ],
-        )
+        corners, triangles = self._meshes[form]
+        placed = (table, _LAYOUT, *_PLACEMENT)
+        mesh = (corners, "3f 3f 2f 3f 3f", *names)
+        return self._gl.vertex_array(program, [mesh, placed], triangles)
 
-    def _shadowing(self, shape: str, table: Any) -> Any:
+    def _shadowing(self, form: str, table: Any) -> Any:
         names = ("in_position", "in_uv", "in_across", "in_up")
-        return self._gl.vertex_array(
-            self._shadow_program,
-            [
-                (self._meshes[shape], "3f 3x4 2f 3f 3f", *names),
-                (table, _LAYOUT, *_PLACEMENT),
-            ],
-        )
+        corners, triangles = self._meshes[form]
+        placed = (table, _LAYOUT, *_PLACEMENT)
+        mesh = (corners, "3f 3x4 2f 3f 3f", *names)
+        return self._gl.vertex_array(self._shadow_program, [mesh, placed], triangles)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +155,9 @@ class _Flock:
         rows: which of all bodies they are.
         skin: their texture.
         buffer: the table's copy.
-        vertices: draws it.
+        near: draws it.
+        far: the same with fewer sides.
+        fine_px: what is narrower is far.
         shadow: draws its shadows.
     """
 
@@ -155,17 +165,23 @@ class _Flock:
     rows: slice
     skin: Any
     buffer: Any
-    vertices: Any
+    near: Any
+    far: Any
+    fine_px: float
     shadow: Any
 
-    def draw(self, away_m: Array, order: int) -> None:
+    def draw(self, away_m: Array, focal_px: float, order: int) -> None:
         """Draw those in sight, the nearest first (order 1) or last (-1)."""
         away_m = away_m[self.rows]
         nearest = np.argsort(away_m)[: np.count_nonzero(np.isfinite(away_m))]
-        if len(nearest):
-            self.buffer.write(self.table[nearest[::order]].tobytes())
-            self.skin.use(0)
-            self.vertices.render(instances=len(nearest))
+        if not len(nearest):
+            return
+        self.skin.use(0)
+        fine = self.table[nearest, 7] * focal_px >= self.fine_px * away_m[nearest]
+        for vertices, some in ((self.near, nearest[fine]), (self.far, nearest[~fine])):
+            if len(some):
+                self.buffer.write(self.table[some[::order]].tobytes())
+                vertices.render(instances=len(some))
 
 
 def _kinds_of(bodies: Sequence[Body]) -> dict[tuple[str, Texture], list[Body]]:

@@ -11,8 +11,6 @@ import numpy as np
 from common.frames import Array
 from worlds import Strip
 
-_CYLINDER_SIDES, _SPHERE_RINGS = 12, 10
-
 
 def box() -> Array:
     """A box of size 1."""
@@ -31,22 +29,23 @@ def box() -> Array:
     return np.asarray(vertices, "f4")
 
 
-def cylinder() -> Array:
-    """A cylinder of size 1."""
+def cylinder(sides: int, radius: float = 0.5) -> Array:
+    """A cylinder of size 1, if the corners of its sides are as far out as that."""
     vertices = []
     round_side = (math.pi, 0.0, 0.0)
     up = (0.0, 0.0, 1.0)
     flat = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
     def rim(step: int, z: float, v: float) -> tuple[float, ...]:
-        angle = 2.0 * math.pi * step / _CYLINDER_SIDES
+        angle = 2.0 * math.pi * step / sides
         x, y = math.cos(angle), math.sin(angle)
-        return (0.5 * x, 0.5 * y, z, x, y, 0.0, step / _CYLINDER_SIDES, v, *round_side, *up)
+        across = (step / sides, v, *round_side, *up)
+        return (radius * x, radius * y, z, x, y, 0.0, *across)
 
     def lid(x: float, y: float, z: float) -> tuple[float, ...]:
         return (x, y, z, 0.0, 0.0, 2.0 * z, x + 0.5, y + 0.5, *flat[0], *flat[1])
 
-    for step in range(_CYLINDER_SIDES):
+    for step in range(sides):
         a, b = rim(step, -0.5, 0.0), rim(step + 1, -0.5, 0.0)
         c, d = rim(step + 1, 0.5, 1.0), rim(step, 0.5, 1.0)
         vertices += [a, b, c, a, c, d]
@@ -55,25 +54,31 @@ def cylinder() -> Array:
     return np.asarray(vertices, "f4")
 
 
-def sphere() -> Array:
-    """A sphere of size 1."""
-    sides = 2 * _SPHERE_RINGS
+def sphere(rings: int, radius: float = 0.5) -> Array:
+    """A sphere of size 1, if its corners are as far out as that."""
+    sides = 2 * rings
 
     def point(ring: int, side: int) -> tuple[float, ...]:
-        rise = math.pi * (ring / _SPHERE_RINGS - 0.5)
+        rise = math.pi * (ring / rings - 0.5)
         turn = 2.0 * math.pi * side / sides
         x, y = math.cos(rise) * math.cos(turn), math.cos(rise) * math.sin(turn)
         z = math.sin(rise)
-        uv = (side / sides, ring / _SPHERE_RINGS)
-        return (0.5 * x, 0.5 * y, 0.5 * z, x, y, z, *uv, math.pi, 0.0, 0.0, 0.0, 0.0, 1.57)
+        uv = (side / sides, ring / rings)
+        return (radius * x, radius * y, radius * z, x, y, z, *uv, math.pi, 0.0, 0.0, 0.0, 0.0, 1.57)
 
     vertices = []
-    for ring in range(_SPHERE_RINGS):
+    for ring in range(rings):
         for side in range(sides):
             a, b = point(ring, side), point(ring, side + 1)
             c, d = point(ring + 1, side + 1), point(ring + 1, side)
             vertices += [a, b, c, a, c, d]
     return np.asarray(vertices, "f4")
+
+
+def indexed(vertices: Array) -> tuple[Array, Array]:
+    """Each vertex once, and which one each corner of a triangle is."""
+    unlike, numbers = np.unique(vertices, axis=0, return_inverse=True)
+    return unlike, numbers.astype("i4")
 
 
 def ribbon(strip: Strip) -> tuple[Array, Array]:

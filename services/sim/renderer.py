@@ -95,7 +95,8 @@ class GlRenderer:
             program["from_world"] = tuple(from_world.T.ravel())
         away_m = self._bodies.look(eye, from_world)
         figures = [body for other in shot.others for body in other.bodies()]
-        self._bodies.draw_opaque(away_m, figures)
+        focal_px = camera.lens.intrinsics[0]
+        self._bodies.draw_opaque(away_m, focal_px, figures)
         gl.disable(moderngl.CULL_FACE)
         self._ground.draw()
         gl.depth_func = "<="
@@ -103,7 +104,7 @@ class GlRenderer:
         gl.depth_func = "<"
         gl.enable(moderngl.CULL_FACE | moderngl.BLEND)
         self._shade.draw(shot.others, from_world)
-        self._bodies.draw_nets(away_m)
+        self._bodies.draw_nets(away_m, focal_px)
         self._finish()
         return target.read()
 

@@ -97,11 +97,14 @@ def seen_by_pybullet(world: World, shot: Shot) -> np.ndarray:
         pybullet.disconnect(client)
 
 
-def off_edge_px(renderer: Renderer, shot: Shot) -> np.ndarray:
-    """How far from an edge those pixels are on which ours and pybullet's camera disagree."""
+def off_edge_px(renderer: Renderer, shot: Shot, least: float = 0.05) -> np.ndarray:
+    """How far from an edge those pixels are on which ours and pybullet's camera disagree.
+
+    Bodies are to fill more than `least` of the picture.
+    """
     ours = silhouette(renderer, [world_of("container"), world_of("crate")], FRONT_CAMERA, shot)
     theirs = seen_by_pybullet(world_of("crate"), shot)
-    assert theirs.mean() > 0.05
+    assert theirs.mean() > least
     edge = cv2.morphologyEx(theirs.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
     return np.asarray(cv2.distanceTransform(1 - edge, cv2.DIST_L2, 5)[ours != theirs])
 
@@ -122,6 +125,12 @@ def test_edges_are_where_pybullets_own_camera_has_them(
     assert off_px.size < 600
     assert np.sum(off_px > 1.0) <= 10
     assert off_px.max() <= 2.0
+
+
+def test_edges_of_what_is_far_and_has_fewer_sides_are_there_too(gl: Renderer) -> None:
+    for away_m in (8.0, 14.0, 20.0):
+        off_px = off_edge_px(gl, shot_at((-away_m, 0.1, 1.1), 0.1, 0.0, 0.0), least=0.0005)
+        assert np.sum(off_px > 1.0) == 0
 
 
 def test_edges_of_the_fallback_are_where_pybullets_own_camera_has_them(tiny: Renderer) -> None:
