@@ -1,5 +1,6 @@
 """Makes what a network says of its own certainty true, on people it has not learned from."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -58,8 +59,9 @@ def scaled(logits: Tensor, lengths: Tensor, scaling: Tensor) -> Tensor:
             the length adds to it.
     """
     usual, per_e_fold = torch.split(scaling, 1)
-    age = torch.log(lengths.to(logits.dtype) / USUAL_SAMPLES).unsqueeze(1)
-    return logits * torch.exp(usual + age * per_e_fold)
+    # exp(usual + log(length / USUAL_SAMPLES) * per_e_fold) in fewer operations: one is constant.
+    usual = torch.exp(usual - math.log(USUAL_SAMPLES) * per_e_fold)
+    return logits * (usual * lengths.view(-1, 1).to(logits.dtype) ** per_e_fold)
 
 
 def platt_of(logit: Tensor, is_meant: Tensor) -> tuple[float, float]:

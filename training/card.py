@@ -94,5 +94,5 @@ The {wide.name} population:
   `autocomplete train --finetune` adapts it to one.
 - The people held out here are of the same families as those it learned from.
 - Windows over 400 samples keep the newest 400.
-- A turn of 0.2 rad/s is a line to it until 65 to 90 degrees are flown.
+- A turn of 0.2 rad/s is a line to it until 60 to 85 degrees are flown.
 """

@@ -59,6 +59,7 @@ def export(fitted: Fitted, labels: Sequence[str], name: str, path: Path) -> str:
         "rate_hz": str(MODEL_RATE_HZ),
         "confidence_min": f"{fitted.confidence_min:.4f}",
     }
+    graph.graph.name = name
     onnx.helper.set_model_props(graph, metadata)
     onnx.checker.check_model(graph, full_check=True)
     onnx.save(graph, str(path))

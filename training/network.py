@@ -86,7 +86,7 @@ class _Standard(nn.Module):
 
 
 class _Convolution(nn.Module):
-    """Conv1d, batch norm, LeakyReLU; padding stays 0, so its length changes nothing."""
+    """Conv1d, batch norm, LeakyReLU; of 0 where padded, so its length changes nothing."""
 
     def __init__(self, inputs: int, outputs: int, taps: int, stride: int) -> None:
         super().__init__()
@@ -95,8 +95,8 @@ class _Convolution(nn.Module):
         self.stride = stride
 
     def forward(self, x: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
-        mask = mask[:, :, :: self.stride]
-        return F.leaky_relu(self.norm(self.conv(x)), LEAK) * mask, mask
+        x = F.leaky_relu(self.norm(self.conv(x * mask)), LEAK)
+        return x, mask[:, :, :: self.stride]
 
 
 class Encoder(nn.Module):
@@ -132,20 +132,20 @@ class Encoder(nn.Module):
 
     def forward(self, x: Tensor, mask: Tensor) -> Tensor:
         """Features (B, features) of series (B, channels, T); mask (B, 1, T) is 1 where real."""
-        x = self.standardise(x).clamp(-LARGEST, LARGEST) * mask
+        x = self.standardise(x).clamp(-LARGEST, LARGEST)
         for convolution in self.convolutions:
             x, mask = convolution(x, mask)
+        # What comes after the last real step changes no state before it.
         states, _ = self.gru(self.dropout(x.transpose(1, 2)))
         shares = []
         if "last" in self.pooling:
             # The last real step: the only one that no real one follows.
-            shares.append(mask - F.pad(mask[:, :, 1:], (0, 1)))
+            shares.append(mask - F.pad(mask, (-1, 1)))
         if "mean" in self.pooling:
             shares.append(mask / mask.sum(2, keepdim=True))
         pooled = [torch.matmul(torch.cat(shares, 1), states).flatten(1)] if shares else []
         if "largest" in self.pooling:
-            # States are within -1 and 1.
-            pooled.append((states + 2.0 * (mask.transpose(1, 2) - 1.0)).amax(1))
+            pooled.append((states + torch.log(mask).transpose(1, 2)).amax(1))
         return torch.cat(pooled, 1)
 
 
@@ -182,8 +182,8 @@ class Trunk(nn.Module):
 class Network(nn.Module):
     """From sticks to what they mean: geometry, encoder and summary side by side, decisions."""
 
-    both: Tensor
-    needed: Tensor
+    against: Tensor
+    costs: Tensor
 
     def __init__(self, architecture: Architecture | None = None) -> None:
         super().__init__()
@@ -213,10 +213,11 @@ class Network(nn.Module):
             nn.Linear(a.head, answers + 1),
         )
         signs = torch.tensor([DECISIONS[label] for label in PRIMITIVES], dtype=torch.float32).T
-        # Column k of `both` is decision k; column k + 3 the same denied.
-        self.register_buffer("both", torch.cat([torch.eye(3), -torch.eye(3)], 1), persistent=False)
-        needed = torch.cat([(signs > 0).float(), (signs < 0).float()])
-        self.register_buffer("needed", needed, persistent=False)
+        # Column k of `against` is decision k denied; column k + 3 the decision itself.
+        against = torch.cat([-torch.eye(3), torch.eye(3)], 1)
+        self.register_buffer("against", against, persistent=False)
+        costs = -torch.cat([(signs > 0).float(), (signs < 0).float()])
+        self.register_buffer("costs", costs, persistent=False)
 
     def forward(
         self, sticks: Tensor, times_s: Tensor, lengths: Tensor, full_yaw_radps: Tensor
@@ -265,7 +266,7 @@ class Network(nn.Module):
         logits, meant = out[:, :-1], out[:, -1]
         if self.architecture.decisions:
             # log(sigmoid(z)) = -softplus(-z): the probability of a chain is the sum of these.
-            logits = -F.softplus(-(logits @ self.both)) @ self.needed
+            logits = F.softplus(logits @ self.against) @ self.costs
         return logits, meant
 
 

@@ -63,3 +63,16 @@ def test_the_threshold_in_the_file_is_the_one_that_was_calibrated(
     again = tmp_path / "intent.onnx"
     export(fitted, PRIMITIVES, "intent", again)
     assert OnnxModel(again).confidence_min == model.confidence_min
+
+
+def test_what_is_said_of_a_held_stick_does_not_hang_on_rounding() -> None:
+    """Turns of such a stick may cancel out: then nothing tells left from right."""
+    model = OnnxModel(MODELS / "intent.onnx")
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        stick = rng.uniform(-1.0, 1.0, 4) * (rng.random(4) < 0.6)
+        held = np.tile(stick, (int(rng.integers(20, 401)), 1)).astype(np.float32)
+        touched = held * (1.0 + 1e-7 * rng.standard_normal(held.shape)).astype(np.float32)
+        before, after = model.answer(held, FULL_YAW_RADPS), model.answer(touched, FULL_YAW_RADPS)
+        assert after.probabilities == pytest.approx(before.probabilities, abs=0.02), stick
+        assert after.meant == pytest.approx(before.meant, abs=0.02), stick
