@@ -63,6 +63,12 @@ def _fault_of(config_type: type, key: str, values: Mapping[str, Any]) -> str:
     return ""
 
 
+def _is_right_beside(config_type: type, key: str, value: object, others: Mapping[str, Any]) -> bool:
+    """Whether a value is right beside those of others that are right alone."""
+    right = {k: v for k, v in others.items() if not _fault_of(config_type, k, {k: v})}
+    return not _fault_of(config_type, key, {**right, key: value})
+
+
 def _choices_of(config_type: type, key: str) -> str:
     """What a field takes, if that can be counted."""
     kind = get_type_hints(config_type)[key]
@@ -102,18 +108,22 @@ def load(
     sources.append(("the command line", {k: v for k, v in (flags or {}).items() if v is not None}))
 
     known = {field.name for field in dataclasses.fields(config_type)}  # type: ignore[arg-type]
-    values = {key: value for _, given in sources for key, value in given.items()}
     for origin, given in sources:
-        for key, value in given.items():
+        for key in given:
             if key not in known:
                 raise ConfigError(
                     f"{service}: {origin} sets {key!r}, which is unknown;"
                     f" known are {', '.join(sorted(known))}"
                 )
+    values = {key: value for _, given in sources for key, value in given.items()}
+    for origin, given in sources:
+        for key, value in given.items():
             # Checked one by one, so that an error can say where the value came from; some are
-            # right only beside another one, as the ends of a range.
+            # right only beside another one, as the ends of a range: of its source or of all.
             fault = _fault_of(config_type, key, {key: value})
-            if fault and _fault_of(config_type, key, {**values, key: value}):
+            if fault and not any(
+                _is_right_beside(config_type, key, value, others) for others in (given, values)
+            ):
                 raise ConfigError(f"{service}: {origin} sets {key!r}: {fault}")
     try:
         return msgspec.convert(values, config_type, strict=False)

@@ -78,7 +78,8 @@ class Bodies:
             table = _table(alike)
             buffer = self._gl.buffer(table.tobytes(), dynamic=True)
             near = self._drawn(program, shape, buffer)
-            far_form, fine_px = _FAR.get(shape, (shape, 0.0))
+            # Nets are drawn from far to near, whatever their form.
+            far_form, fine_px = (shape, 0.0) if texture == NET else _FAR.get(shape, (shape, 0.0))
             far = self._drawn(program, far_form, buffer)
             shadow = self._shadowing(shape, buffer)
             rows = slice(begin, begin + len(table))
@@ -177,7 +178,8 @@ class _Flock:
         if not len(nearest):
             return
         self.skin.use(0)
-        fine = self.table[nearest, 7] * focal_px >= self.fine_px * away_m[nearest]
+        near_m = away_m[nearest] - 0.5 * np.linalg.norm(self.table[nearest, 7:10], axis=1)
+        fine = self.table[nearest, 7] * focal_px >= self.fine_px * near_m
         for vertices, some in ((self.near, nearest[fine]), (self.far, nearest[~fine])):
             if len(some):
                 self.buffer.write(self.table[some[::order]].tobytes())

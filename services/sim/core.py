@@ -61,7 +61,11 @@ class Simulation:
         self._stage = Stage(self._world, STEP_S)
         for actor in self.actors:
             hull = self._stage.add(actor.plant.build)
-            start = _start_place(self._world, hull, actor)
+            try:
+                start = _start_place(self._world, hull, actor)
+            except ResetError:
+                self.close()
+                raise
             actor.enter(self._stage, self._world.name, hull, *start)
         for actor in self.actors:
             actor.restart()

@@ -5,8 +5,7 @@ see ground.py; that of a vehicle moves, and a spot is all that costs next to not
 """
 
 import math
-from collections.abc import Sequence
-from functools import lru_cache
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import moderngl
@@ -103,6 +102,6 @@ def _in_sight(spots: list[Vector3], from_world: Array) -> list[Vector3]:
     return seen
 
 
-@lru_cache(maxsize=16)
-def _radius_m(look: tuple[Body, ...]) -> float:
-    return max(math.hypot(*body.position_m[:2]) + max(body.size_m[:2]) / 2.0 for body in look)
+def _radius_m(look: Iterable[Body]) -> float:
+    """How far it reaches about its middle, whichever way its bodies lie."""
+    return max(math.hypot(*body.position_m[:2]) + max(body.size_m) / 2.0 for body in look)

@@ -103,6 +103,10 @@ def test_what_is_right_only_together_may_be_set_together(tmp_path: Path) -> None
     assert load(Example, "sim", file, {"AUTOCOMPLETE_SIM_MOST": "9"}).most == 9
     with pytest.raises(ConfigError, match=r"system\.toml sets 'least': must be below most"):
         load(Example, "sim", file, {"AUTOCOMPLETE_SIM_MOST": "6"})
+    both = write(tmp_path, "[sim]\nleast = 7\nmost = 9\n")
+    assert load(Example, "sim", both, {}, {"least": 2, "most": 4}).least == 2
+    with pytest.raises(ConfigError, match="the command line sets 'rate_hz'"):
+        load(Example, "sim", both, {}, {"rate_hz": -1.0})
 
 
 def test_a_bad_value_is_blamed_on_its_source_though_a_better_one_wins(tmp_path: Path) -> None:

@@ -181,7 +181,8 @@ def test_a_vehicles_shade_lies_where_the_shadow_of_a_thing_in_its_place_would(
 
     bare = light((), ())
     cast = (
-        light((), (Figure((disc,), place, UPRIGHT),)),
+        # Someone's own file may have lists and arrays.
+        light((), (Figure([replace(disc, size_m=np.asarray(disc.size_m))], place, UPRIGHT),)),
         light((replace(disc, position_m=place),), ()),
     )
     spot, shadow = (np.argwhere(each < 0.85 * bare) for each in cast)
