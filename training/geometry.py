@@ -99,7 +99,7 @@ MEASURES = {
 first three are shares of the next three."""
 SPREAD_FLOOR = 1e-3
 """Added to the squares below: a fortieth of full stick is no spread, and no net motion. Rounding
-errors are far less, so no sum is below 0."""
+errors are far less, so no sum of sticks within full ones is below 0."""
 WHOLE_SIGNALS = ("one", "x", "y", "z", "climb", "speed")
 WHOLE_MEANS = ("one one", "one x", "one y", "one z", "one climb", "one speed", "z z", "speed speed")
 SPREADS = {
