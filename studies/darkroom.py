@@ -173,8 +173,12 @@ def _paint(pipe: Connection, config: Config) -> None:
                 cameras = {(camera.vehicle, camera.topic): camera for camera in asked.cameras}
                 renderer.load(asked.scene)
             else:
-                camera = cameras[asked.vehicle, asked.topic]
-                answer = photograph(renderer, camera, asked, config.jpeg_quality)
+                try:
+                    camera = cameras[asked.vehicle, asked.topic]
+                    answer = photograph(renderer, camera, asked, config.jpeg_quality)
+                except Exception as error:
+                    # It is this picture's; the next ones are drawn.
+                    answer = error
             pipe.send(answer)
     except (EOFError, OSError):
         return

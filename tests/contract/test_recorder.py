@@ -197,7 +197,7 @@ def test_a_full_disk_is_told_in_health_and_ends_nothing(
         (("--folder", "/dev/null/recordings"), "choose another folder"),
         (("--compression", "zip"), "compression"),
         (("--chunk-bytes", "1"), "use 1024 to"),
-        (("--folder", ""), "folder is empty"),
+        (("--folder", ""), "'folder': is empty"),
     ],
 )
 def test_what_cannot_work_is_one_line_on_stderr(

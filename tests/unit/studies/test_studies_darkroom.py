@@ -59,6 +59,7 @@ def test_pictures_are_the_same_whoever_draws_them_and_errors_come_to_who_wants_t
     for order in spoilt:
         with pytest.raises(ValueError, match="unpack"):
             order.result()
-    with pytest.raises(RuntimeError, match="ended"):
-        late.result()
+    assert late.result() == pictures[0]
     darkroom.close()
+    with pytest.raises(RuntimeError, match="ended"):
+        darkroom.develop(SHOT).result()
