@@ -12,6 +12,7 @@ from rich.table import Table
 
 from cli import options as opts
 from cli.progress import counted
+from services.classifier.config import SHIPPED_MODEL
 
 if TYPE_CHECKING:
     from training.fit import Epoch
@@ -57,7 +58,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--model",
         metavar="FILE",
         type=Path,
-        help="the model that --finetune begins with (models/intent.onnx)",
+        help="the model that --finetune begins with (the shipped one)",
     )
     parser.add_argument(
         "--operator",
@@ -153,7 +154,7 @@ def _finetune(console: Console, options: argparse.Namespace, seed: int, bars: _B
     for finding in findings:
         console.print(f"left out: {finding}")
     out = options.out or Path("models/finetuned")
-    begin = options.model or Path("models/intent.onnx")
+    begin = options.model or SHIPPED_MODEL
     done = finetune(primitives, begin, out, seed, bars.generating, options.operator)
     learned = done.learned
     console.print(
