@@ -59,7 +59,8 @@ def scaled(logits: Tensor, lengths: Tensor, scaling: Tensor) -> Tensor:
             the length adds to it.
     """
     usual, per_e_fold = torch.split(scaling, 1)
-    # exp(usual + log(length / USUAL_SAMPLES) * per_e_fold) in fewer operations: one is constant.
+    # exp(usual + log(length / USUAL_SAMPLES) * per_e_fold) in fewer operations: what a window of
+    # one sample would have is constant, and the length only to a power.
     usual = torch.exp(usual - math.log(USUAL_SAMPLES) * per_e_fold)
     return logits * (usual * lengths.view(-1, 1).to(logits.dtype) ** per_e_fold)
 

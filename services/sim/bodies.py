@@ -69,28 +69,26 @@ class Bodies:
         self._scene_objects = []
         self._flocks: list[_Flock] = []
         self._nets: list[_Flock] = []
-        tables = [np.empty((0, _COLUMNS), "f4")]
+        whole = _table([body for alike in _kinds_of(bodies).values() for body in alike])
+        self._centres_m = whole[:, :3].astype(np.float64)
+        self._radii_m = 0.5 * np.linalg.norm(whole[:, 7:10].astype(np.float64), axis=1)
         begin = 0
         for (shape, texture), alike in _kinds_of(bodies).items():
             flocks, program = (
                 (self._nets, self._net) if texture == NET else (self._flocks, self._opaque)
             )
-            table = _table(alike)
+            rows = slice(begin, begin + len(alike))
+            table = whole[rows]
             buffer = self._gl.buffer(table.tobytes(), dynamic=True)
             near = self._drawn(program, shape, buffer)
             # Nets are drawn from far to near, whatever their form.
             far_form, fine_px = (shape, 0.0) if texture == NET else _FAR.get(shape, (shape, 0.0))
             far = self._drawn(program, far_form, buffer)
             shadow = self._shadowing(shape, buffer)
-            rows = slice(begin, begin + len(table))
-            skin = self._textures[texture]
-            flocks.append(_Flock(table, rows, skin, buffer, near, far, fine_px, shadow))
+            skin, radii_m = self._textures[texture], self._radii_m[rows]
+            flocks.append(_Flock(table, rows, radii_m, skin, buffer, near, far, fine_px, shadow))
             self._scene_objects += [near, far, shadow, buffer]
-            tables.append(table)
-            begin += len(table)
-        whole = np.concatenate(tables).astype(np.float64)
-        self._centres_m = whole[:, :3]
-        self._radii_m = 0.5 * np.linalg.norm(whole[:, 7:10], axis=1)
+            begin += len(alike)
 
     def cast_shadows(self, window: Array) -> None:
         """Draw the shadows into a window of the ground."""
@@ -154,6 +152,7 @@ class _Flock:
     Attributes:
         table: see `_table`.
         rows: which of all bodies they are.
+        radii_m: no point of each is farther from its centre.
         skin: their texture.
         buffer: the table's copy.
         near: draws it.
@@ -164,6 +163,7 @@ class _Flock:
 
     table: Array
     rows: slice
+    radii_m: Array
     skin: Any
     buffer: Any
     near: Any
@@ -178,7 +178,7 @@ class _Flock:
         if not len(nearest):
             return
         self.skin.use(0)
-        near_m = away_m[nearest] - 0.5 * np.linalg.norm(self.table[nearest, 7:10], axis=1)
+        near_m = away_m[nearest] - self.radii_m[nearest]
         fine = self.table[nearest, 7] * focal_px >= self.fine_px * near_m
         for vertices, some in ((self.near, nearest[fine]), (self.far, nearest[~fine])):
             if len(some):
