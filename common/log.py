@@ -3,6 +3,7 @@
 import json
 import logging
 import sys
+import time
 from typing import Any
 
 from common.clock import NS_PER_S, Clock
@@ -12,13 +13,18 @@ REPEAT_PERIOD_S = 1.0
 
 
 class _JsonFormatter(logging.Formatter):
+    # UTC, so that the logs of two machines can be laid side by side.
+    converter = staticmethod(time.gmtime)
+    default_time_format = "%Y-%m-%dT%H:%M:%S"
+    default_msec_format = "%s.%03dZ"
+
     def __init__(self, bound: dict[str, str]) -> None:
         super().__init__()
         self._bound = bound
 
     def format(self, record: logging.LogRecord) -> str:
         line: dict[str, Any] = {
-            "time": self.formatTime(record, "%Y-%m-%dT%H:%M:%S"),
+            "time": self.formatTime(record),
             "level": record.levelname.lower(),
             **self._bound,
             "logger": record.name,

@@ -51,6 +51,9 @@ class _Subscription:
     box: deque[tuple[bytes, int]]
     ages: bool
     received: int = 0
+    """Counted up by the network's threads alone, so that no count is lost between threads."""
+    told: int = 0
+    """Of those received, how many are in the rates that `health` has told."""
     rejected: int = 0
 
 
@@ -66,7 +69,6 @@ class _Timer:
     period_ns: int
     handler: Callable[[int], None]
     due_ns: int
-    timed: bool
 
 
 class Node:
@@ -134,8 +136,7 @@ class Node:
         if depth is None:
             depth = EVENT_DEPTH if topic.delivery is Delivery.EVENT else 1
         handler = self._timed(handler) if timed else handler
-        subscription = _Subscription(topic, handler, deque(), ages)
-        subscription.box = deque(maxlen=depth)
+        subscription = _Subscription(topic, handler, deque(maxlen=depth), ages)
         self._subscriptions[topic_name] = subscription
 
         def receive(payload: bytes) -> None:
@@ -163,7 +164,7 @@ class Node:
         period_ns = nanoseconds(period_s)
         due_ns = self.clock.monotonic_ns() + period_ns
         wrapped = self._timed_tick(handler) if timed else handler
-        self._timers.append(_Timer(period_ns, wrapped, due_ns, timed))
+        self._timers.append(_Timer(period_ns, wrapped, due_ns))
 
     def publishes(self, *topic_names: str) -> None:
         """Declare topics before their first message, so that readers find them at once."""
@@ -207,6 +208,7 @@ class Node:
         Raises:
             RefusedError: if the server refuses.
             QueryFailedError: if nobody answers in time.
+            InvalidPayloadError: if the answer is none that the contract allows.
         """
         query = QUERIES[query_name]
         try:
@@ -257,11 +259,12 @@ class Node:
             node.spin()
 
     def close(self) -> None:
-        """Run the closers and leave the bus."""
-        for node in (*self._besides, self):
-            for closer in reversed(node._closers):
-                closer()
-        self.bus.close()
+        """Run the closers and leave the bus; a closer that fails keeps none from its turn."""
+        with contextlib.ExitStack() as turns:
+            turns.callback(self.bus.close)
+            for node in (self, *reversed(self._besides)):
+                for closer in node._closers:
+                    turns.callback(closer)
 
     # --- inside ----------------------------------------------------------------------------------
 
@@ -299,7 +302,7 @@ class Node:
     def _answer(self, server: _Server, request: Request) -> None:
         try:
             question = m.decode(request.payload, server.query.request)
-            reply = server.handler(question, self.clock.monotonic_ns())
+            reply = m.encode(server.handler(question, self.clock.monotonic_ns()))
         except m.InvalidPayloadError as error:
             refusal = m.QueryError(error=str(error), field=_field_in(str(error), server.query))
             request.refuse(m.encode(refusal), m.encoding_of(m.QueryError))
@@ -311,7 +314,7 @@ class Node:
             refusal = m.QueryError(error=f"{self.service} could not handle this: {error}")
             request.refuse(m.encode(refusal), m.encoding_of(m.QueryError))
         else:
-            request.reply(m.encode(reply), m.encoding_of(server.query.reply))
+            request.reply(reply, m.encoding_of(server.query.reply))
 
     def _fault(self, name: str, error: Exception) -> None:
         """A message that was valid has hit a fault of ours: say so, and go on without it."""
@@ -339,8 +342,9 @@ class Node:
         self._health_since_ns = now_ns
         rates: dict[str, float] = {}
         for name, subscription in self._subscriptions.items():
-            rates[name] = subscription.received / elapsed_s
-            subscription.received = 0
+            received = subscription.received
+            rates[name] = (received - subscription.told) / elapsed_s
+            subscription.told = received
         state, detail = self._health_of_core()
         if self._faults:
             state = "failed" if state == "failed" else "degraded"

@@ -69,7 +69,7 @@ def run_service(
         ValueError: if the vehicle's name or the endpoint cannot be used.
         OSError: if this machine lacks what the configuration asks for.
     """
-    key_of(vehicle, service)
+    key_of(vehicle, service)  # refuses a name that no key can hold, before anything is opened
     settings = config.load(config_type_of(service), service, config_file, flags=flags)
     log.configure(service, vehicle)
     stop = stop_on_signals()

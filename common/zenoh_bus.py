@@ -158,13 +158,17 @@ class ZenohBus:
         Raises:
             QueryFailedError: on a refusal, or when nobody answers in time.
         """
-        replies = self._session.get(
-            key,
-            payload=payload,
-            encoding=zenoh.Encoding(encoding),
-            timeout=timeout_s,
-            **_QUESTION_QOS,
-        )
+        try:
+            replies = self._session.get(
+                key,
+                payload=payload,
+                encoding=zenoh.Encoding(encoding),
+                timeout=timeout_s,
+                **_QUESTION_QOS,
+            )
+        except zenoh.ZError as error:
+            # Asked on a thread of its own, while another one closes the session.
+            raise QueryFailedError(f"{key} cannot be asked: {error}") from None
         for reply in replies:
             if reply.ok is not None:
                 return bytes(reply.ok.payload.to_bytes())

@@ -263,6 +263,13 @@ def test_closing_twice_is_closing_once(join: Join) -> None:
     bus.close()
 
 
+def test_a_question_on_a_closed_bus_has_no_answer(join: Join) -> None:
+    bus = join()
+    bus.close()
+    with pytest.raises(QueryFailedError):
+        bus.ask("anybody", b"x", ENCODING, 1.0)
+
+
 def test_a_joined_bus_is_linked(join: Join) -> None:
     assert join().linked()
 

@@ -3,6 +3,7 @@
 import json
 import logging
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 
 import pytest
 
@@ -31,6 +32,7 @@ def test_each_line_is_json_and_names_service_and_vehicle(
         logging.getLogger("b").exception("went wrong")
     logging.getLogger("c").debug("not shown")
     first, second = map(json.loads, capsys.readouterr().err.splitlines())
+    assert datetime.now(UTC) - datetime.fromisoformat(first["time"]) < timedelta(seconds=5)
     assert first["message"] == "up with 3"
     assert (first["level"], first["logger"]) == ("info", "a")
     assert (first["service"], first["vehicle"]) == ("sim", "drone7")

@@ -256,6 +256,30 @@ def test_a_question_is_answered_refused_or_found_bad(world: World) -> None:
     assert answered(world, node, ask, b"\xff\x00noise")["refused"]["error"]
 
 
+def test_an_answer_that_cannot_be_sent_is_a_refusal_and_ends_nothing(world: World) -> None:
+    server, client = world.node("autopilot"), MemoryBus(world.network)
+    server.answer(
+        "autopilot/decide",
+        lambda request, _: m.DecideReply(ok=True, reason=object(), mode="manual"),  # type: ignore[arg-type]
+    )
+    refusals: list[bytes | None] = []
+
+    def ask() -> None:
+        question = m.encode(m.DecideRequest(action="land", nonce=1))
+        try:
+            client.ask(key_of(VEHICLE, "autopilot/decide"), question, "", 5.0)
+        except QueryFailedError as error:
+            refusals.append(error.payload)
+
+    asker = threading.Thread(target=ask)
+    asker.start()
+    while not server._servers[0].box:
+        asker.join(0.01)
+    server.spin()
+    asker.join(5.0)
+    assert "could not handle" in msgpack.unpackb(refusals[0] or b"")["error"]
+
+
 def test_a_node_asks_another(world: World) -> None:
     sim, asker = world.node("sim"), world.node("operator")
     sim.answer("sim/worlds", lambda *_: m.WorldsReply(worlds=["track"]))
@@ -328,6 +352,21 @@ def test_run_announces_serves_and_ends_when_told(world: World) -> None:
     node.close()
     assert alive == {key: False}
     assert closed == ["last declared", "first declared"]
+
+
+def test_a_closer_that_fails_keeps_nothing_open(world: World) -> None:
+    node = world.node("sim")
+    closed: list[str] = []
+    node.on_close(lambda: closed.append("first declared"))
+    node.on_close(lambda: {}["none"])
+    node.beside("second").on_close(lambda: closed.append("beside"))
+    node.bus.announce("a/token")
+    alive: list[bool] = []
+    world.bus.watch("a/token", lambda _, there: alive.append(there))
+    with pytest.raises(KeyError):
+        node.close()
+    assert closed == ["beside", "first declared"]
+    assert alive == [True, False]
 
 
 def test_a_service_sleeps_until_something_comes(
