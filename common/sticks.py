@@ -31,6 +31,12 @@ class FullStick:
     down_mps: float
     linear_to: float = 1.0
 
+    @property
+    def moves_every_way(self) -> bool:
+        """Whether each stick moves the vehicle, as drones do and cars do not."""
+        speeds = (self.forward_mps, self.left_mps, self.up_mps, self.down_mps, self.yaw_radps)
+        return min(speeds) > 0.0
+
 
 _TILTED_MPS = 9.81 * math.tan(math.radians(12.0)) / 0.58
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from common.messages import VehicleStatus
-from common.sticks import FULL_STICK
+from common.sticks import FULL_STICK, full_stick_of
 
 
 @dataclass(frozen=True)
@@ -62,13 +62,13 @@ def plant_of(status: VehicleStatus) -> Plant | None:
     """The model of a vehicle; None if it has none, or cannot move to every side as drones do."""
     if status.full_stick is None or status.rates is None:
         return PLANTS.get(status.plant)
-    if not all((*status.full_stick, *status.rates)):
+    full = full_stick_of(status)
+    if not (full.moves_every_way and all(status.rates)):
         return None
-    forward_mps, left_mps, up_mps, down_mps, yaw_radps = status.full_stick
     level_ps, upright_ps, turn_ps = status.rates
     return Plant(
-        plane=Response(level_ps, 0.0, min(forward_mps, left_mps)),
-        up=Response(upright_ps, 0.0, up_mps),
-        down=Response(upright_ps, 0.0, down_mps),
-        yaw=Response(turn_ps, 0.0, yaw_radps),
+        plane=Response(level_ps, 0.0, min(full.forward_mps, full.left_mps)),
+        up=Response(upright_ps, 0.0, full.up_mps),
+        down=Response(upright_ps, 0.0, full.down_mps),
+        yaw=Response(turn_ps, 0.0, full.yaw_radps),
     )

@@ -296,7 +296,11 @@ class Pilot:
         if self._vehicle[1].world != self._route.world:
             self._note(note=f"the vehicle is in world {self._vehicle[1].world}")
             return None
-        self._full = full_stick_of(self._vehicle[1])
+        full = full_stick_of(self._vehicle[1])
+        if not full.moves_every_way:
+            self._note(note=f"a {self._vehicle[1].plant} cannot move every way as a drone does")
+            return None
+        self._full = full
         self._begin_ns = now_ns
         if self._vehicle[1].state == "flying":
             self._enter(Phase.CLIMBING, now_ns)

@@ -7,7 +7,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from common.frames import quaternion_of
-from common.messages import AutopilotStatus, FlightMode, Pose, Suggestion, VehicleStatus
+from common.messages import (
+    AutopilotStatus,
+    FlightMode,
+    FullStickSpeeds,
+    Pose,
+    Suggestion,
+    VehicleStatus,
+)
 from services.operator.pilot import Decision, Person, Pilot
 from services.operator.route import Route
 from services.operator.sources import Deflection
@@ -90,6 +97,7 @@ class Flight:
         self.decisions: list[tuple[float, Decision]] = []
         self.engaged: list[tuple[int, str]] = []
         self.refusals = 0
+        self.full_stick: FullStickSpeeds | None = None
         self.hovers = False
         """Set by a gap in the sticks; the autopilot obeys again once they were neutral."""
         self._offered: dict[int, Suggestion] = {}
@@ -136,6 +144,7 @@ class Flight:
                     world="track",
                     plant="tum",
                     collisions=0,
+                    full_stick=self.full_stick,
                 ),
                 self.now_ns,
             )

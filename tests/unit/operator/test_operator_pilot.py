@@ -277,3 +277,16 @@ def test_nothing_begins_before_vehicle_autopilot_and_picture_are_there() -> None
         assert sticks == NEUTRAL
         assert decision is None
     assert "no vehicle, autopilot" in str(flight.pilot.progress)
+
+
+def test_what_cannot_climb_or_move_sideways_is_left_alone_and_told_of() -> None:
+    flight = Flight(TRACK, Person(seed=1))
+    flight.vehicle.state = "flying"
+    flight.full_stick = (1.0, 0.0, 0.0, 0.0, 1.5)
+    flight.run(5.0)
+    assert set(flight.sticks) == {NEUTRAL}
+    assert flight.decisions == []
+    assert "cannot move every way" in str(flight.pilot.progress)
+    flight.full_stick = None
+    flight.run(10.0)
+    assert flight.pilot.progress.phase is not Phase.WAITING
