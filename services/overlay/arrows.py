@@ -60,18 +60,22 @@ class Stretch:
 def ahead(suggestion: Suggestion, position_m: Array, length_m: float) -> Stretch:
     """The path from its point nearest to the vehicle onward, at most `length_m` of it.
 
-    A closed path goes on from its end to its start. Arrows stand at fixed places of the path, so
+    Nothing of a path that leads nowhere, or farther than numbers go. A closed path goes on from its
+    end to its start. Arrows stand at fixed places of the path, so
     that they lie still in the world and the vehicle flies over them.
     """
     points_m = np.array([point[:3] for point in suggestion.path], dtype=np.float64)
-    nearest = int(np.argmin(np.linalg.norm(points_m - position_m, axis=1)))
     along_m = _along(points_m)
+    lap_m = float(along_m[-1])
+    if not 0.0 < lap_m < math.inf:
+        return Stretch(points_m[:0], FIRST_M, SPACING_M)
+    nearest = int(np.argmin(np.linalg.norm(points_m - position_m, axis=1)))
     spacing_m, flown_m = SPACING_M, float(along_m[nearest])
     onward_m = points_m[nearest:]
     if suggestion.closed:
         onward_m = np.concatenate([onward_m, points_m[: nearest + 1]])
         # A whole number of arrows fits into a lap, so that none moves when one begins.
-        spacing_m = float(along_m[-1]) / max(1, round(float(along_m[-1]) / SPACING_M))
+        spacing_m = lap_m / max(1, round(lap_m / SPACING_M))
     first_m = math.ceil((flown_m + FIRST_M) / spacing_m) * spacing_m - flown_m
     return Stretch(onward_m[_along(onward_m) <= length_m], first_m, spacing_m)
 

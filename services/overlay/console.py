@@ -1,8 +1,8 @@
 """The console's web server: one page, one WebSocket a viewer, on a thread of its own.
 
-A slow or frozen viewer slows nobody: each has its own task, which sends the newest picture only
-after the page has shown the last one. Decisions are asked on worker threads, so that an autopilot
-that does not answer freezes nothing.
+A slow or frozen viewer slows nobody: each has its own task, which sends the newest picture, and at
+most three before the page has shown the first of them. Decisions are asked on worker threads, so
+that an autopilot that does not answer freezes nothing.
 """
 
 import asyncio
@@ -117,8 +117,9 @@ class Console:
 
     def close(self) -> None:
         """Close every connection and stop listening."""
-        if self._stop is not None and self._thread.is_alive():
-            self._loop.call_soon_threadsafe(self._stop.set)
+        if self._stop is not None:
+            with contextlib.suppress(RuntimeError):  # its loop is closed already
+                self._loop.call_soon_threadsafe(self._stop.set)
             self._thread.join(START_TIMEOUT_S)
         for workers in (self._workers, self._urgent_workers):
             workers.shutdown(wait=False, cancel_futures=True)
@@ -136,6 +137,9 @@ class Console:
                 runner.run(self._run())
         except OSError as error:
             self._error = error
+        except UnicodeError as error:
+            # A host that is no name: asyncio encodes it before anybody is asked for it.
+            self._error = OSError(f"{self._host!r} is no host: {error}")
         finally:
             self._started.set()
 

@@ -20,6 +20,9 @@ MATCH_S = 0.1
 OFFERS = 16
 """Suggestions kept: an accepted one may be seconds older than the newest."""
 
+BATTERY_LOW = 0.2
+"""A charge below this is written as a warning; the autopilot begins no path with it."""
+
 SECTORS = ("ahead", "ahead left", "left", "back left", "back", "back right", "right", "ahead right")
 
 
@@ -181,7 +184,7 @@ class Overlay:
         elif pose.status == "degraded":
             texts.append(("pose degraded", pic.WARNING))
         if self.vehicle is not None:
-            low = self.vehicle.battery < 0.2
+            low = self.vehicle.battery < BATTERY_LOW
             battery = f"battery {self.vehicle.battery:.0%}"
             texts.append((battery, pic.WARNING if low else pic.TEXT))
         stick_age_s = self.age_s("stick", now_ns)

@@ -78,7 +78,10 @@ def decode(data: bytes) -> Picture | None:
     """A JPEG as BGR, or None if it is none."""
     if not data:
         return None
-    decoded = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
+    try:
+        decoded = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
+    except cv2.error:  # a header that claims more pixels than OpenCV reads
+        return None
     return None if decoded is None else np.asarray(decoded, dtype=np.uint8)
 
 

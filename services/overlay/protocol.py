@@ -1,8 +1,8 @@
 """What the console's page and its server say to one another, over one WebSocket.
 
 From the server: binary messages are JPEG pictures; text messages are JSON maps with a `type`. The
-page answers each picture with `shown`, and gets the newest picture only then: a slow page sees
-fewer pictures and never old ones.
+page answers each picture with `shown`; few are on their way to a page that does not, and the next
+is always the newest: a slow page sees fewer pictures and never old ones.
 """
 
 import math

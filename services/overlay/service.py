@@ -77,7 +77,11 @@ def _console(node: Node, core: Overlay, config: Config) -> Console:
     try:
         console.start()
     except OSError as error:
-        raise ConfigError(f"console_port: {error.strerror or error}") from None
+        where = f"{config.console_host}:{config.console_port}"
+        reason = error.strerror or error
+        raise ConfigError(
+            f"overlay: console_host, console_port: cannot listen on {where}: {reason}"
+        ) from None
     node.on_close(console.close)
     node.bus.watch(alive_key_of(node.vehicle, "*"), on_alive)
     node.publishes("console/stick")

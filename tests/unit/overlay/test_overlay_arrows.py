@@ -120,6 +120,12 @@ def test_nothing_is_drawn_of_a_path_that_is_shorter_than_an_arrow():
     assert drawn([(0.0, 0.0, 1.0), (0.0, 0.0, 1.0)]) == []
 
 
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("reach_m", [0.0, 1e-300, 1e300])
+def test_nothing_is_drawn_of_a_path_without_a_length_that_can_be_told(reach_m, closed):
+    assert drawn(np.array([[0.0, 0.0, 1.0], [reach_m, 0.0, 1.0]]), closed=closed) == []
+
+
 def test_a_vertical_path_has_arrows_too():
     points_m = [(3.0, 0.0, 0.1 * i) for i in range(30)]
     for arrow in drawn(points_m, pose=scenes.pose(z=0.5)):

@@ -177,16 +177,32 @@ def test_moment_lens_and_size_are_carried_through(core):
     assert drawn.data != image.data
 
 
+def claiming(side_px: int) -> bytes:
+    """A JPEG whose header says that it is a square of so many pixels a side."""
+    data = bytearray(scenes.image().data)
+    sides = data.index(b"\xff\xc0") + 5
+    data[sides : sides + 4] = 2 * side_px.to_bytes(2, "big")
+    return bytes(data)
+
+
 @pytest.mark.parametrize(
     "bad",
     [
         scenes.image(data=b""),
         scenes.image(data=b"\xff\xd8 no picture \xff\xd9"),
         scenes.image(data=scenes.image().data[:200]),
+        scenes.image(data=claiming(65500)),
         scenes.image(width=320),
         scenes.image(picture=np.zeros((48, 64, 3), np.uint8)),
     ],
-    ids=["empty", "no JPEG", "cut off", "another size", "smaller than it says"],
+    ids=[
+        "empty",
+        "no JPEG",
+        "cut off",
+        "too large",
+        "another size",
+        "smaller than it says",
+    ],
 )
 def test_a_picture_that_is_none_is_counted_and_dropped(core, bad):
     assert core.draw(bad, NOW_NS) is None
