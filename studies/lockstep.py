@@ -15,7 +15,8 @@ from common.topics import TOPICS
 from services.autopilot.core import Autopilot, Output
 from services.classifier.core import Classifier
 from services.localizer.core import Localizer
-from services.operator.pilot import Decision, Pilot
+from services.operator.person import Decision
+from services.operator.pilot import Pilot
 from services.operator.sources import Deflection
 from services.sim.core import PHYSICS_HZ, Simulation
 from services.synthesis.core import Synthesizer

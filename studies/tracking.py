@@ -19,7 +19,7 @@ from services.autopilot.core import Autopilot, Follow
 from services.autopilot.follower import Follower
 from services.localizer.config import Config as LocalizerConfig
 from services.localizer.core import Localizer
-from services.operator.pilot import Decision
+from services.operator.person import Decision
 from services.operator.sources import Deflection
 from services.sim.config import Config as SimConfig
 from services.sim.core import Simulation

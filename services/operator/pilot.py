@@ -7,8 +7,7 @@ and takes over by the sticks when a primitive ends or the course is about to lea
 
 import math
 from collections import deque
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,10 +15,12 @@ from common.clock import nanoseconds, seconds
 from common.messages import AutopilotStatus, DecideAction, Pose, Suggestion, VehicleStatus
 from common.sticks import FULL_STICK, full_stick_of
 from common.topics import TOPICS
+from services.operator.attention import Attention
 from services.operator.eyes import Eyes, Sight
 from services.operator.hands import Hands
 from services.operator.judgement import Drawing, ahead_of, compare, drawing_of
 from services.operator.lane import Lane
+from services.operator.person import IN_THE_AIR, Decision, Person, Phase, Progress
 from services.operator.route import Route
 from services.operator.sources import Deflection
 from services.operator.steering import LOOK_AHEAD_M, Climb, foreseen, pursue
@@ -65,93 +66,6 @@ OUT_OF_SIGHT = 1e4
 """m and m/s."""
 
 
-class Phase(Enum):
-    """What he is doing."""
-
-    WAITING = "waiting"
-    TAKING_OFF = "taking off"
-    CLIMBING = "climbing"
-    SETTLING = "settling"
-    STEERING = "steering"
-    RELEASING = "letting go"
-    ASKING = "accepting"
-    WATCHING = "watching"
-    STOPPING = "stopping"
-    LANDING = "landing"
-    DONE = "done"
-    FAILED = "failed"
-
-
-IN_THE_AIR = {
-    Phase.CLIMBING,
-    Phase.SETTLING,
-    Phase.STEERING,
-    Phase.RELEASING,
-    Phase.ASKING,
-    Phase.WATCHING,
-    Phase.STOPPING,
-}
-
-
-@dataclass(frozen=True)
-class Person:
-    """His skill and his task.
-
-    Attributes:
-        speed_mps: what he likes to fly at.
-        height_m: above the route's own height.
-        laps: of the route; 0 for ever.
-        accepts: whether he uses suggestions.
-        reaction_s: from something to be seen to his first movement.
-        tremor: of his hands, as a fraction of full stick.
-        seed: of all his noise.
-    """
-
-    speed_mps: float = 0.85
-    height_m: float = 0.0
-    laps: int = 1
-    accepts: bool = True
-    reaction_s: float = 0.25
-    tremor: float = 0.015
-    seed: int = 1
-
-
-@dataclass(frozen=True)
-class Decision:
-    """A button pressed."""
-
-    action: DecideAction
-    suggestion: int | None = None
-
-
-@dataclass(frozen=True)
-class Progress:
-    """The mission so far."""
-
-    phase: Phase = Phase.WAITING
-    laps: int = 0
-    suggestions: int = 0
-    accepted: int = 0
-    refused: int = 0
-    takeovers: int = 0
-    cancelled: int = 0
-    distance_m: float = 0.0
-    time_s: float = 0.0
-    note: str = ""
-
-    def __str__(self) -> str:
-        """One line; it begins with `mission done` when there is nothing more to do."""
-        names = {Phase.DONE: "mission done", Phase.FAILED: "mission failed"}
-        begin = names.get(self.phase, f"mission {self.phase.value}")
-        if self.note:
-            begin += f" ({self.note})"
-        return (
-            f"{begin}: laps {self.laps} suggestions {self.suggestions} accepted {self.accepted}"
-            f" takeovers {self.takeovers} cancelled {self.cancelled} refused {self.refused}"
-            f" distance_m {self.distance_m:.1f} time_s {self.time_s:.1f}"
-        )
-
-
 class Pilot:
     """The person, stepped at the rate of his sticks.
 
@@ -182,12 +96,9 @@ class Pilot:
         self._since_ns = 0
         self._begin_ns: int | None = None
         self._last_true_m: np.ndarray | None = None
-        # Things on their way from the picture to his mind, with their times of arrival.
-        self._coming_status: deque[tuple[int, AutopilotStatus]] = deque()
-        self._coming_suggestions: deque[tuple[int, Suggestion]] = deque()
-        self._coming_vehicle: deque[tuple[int, VehicleStatus]] = deque()
-        self._status: tuple[int, AutopilotStatus] | None = None
-        self._vehicle: tuple[int, VehicleStatus] | None = None
+        self._statuses = Attention[AutopilotStatus](person.reaction_s)
+        self._suggestions = Attention[Suggestion](person.reaction_s)
+        self._vehicles = Attention[VehicleStatus](person.reaction_s)
         self._drawing: Drawing | None = None
         self._drawing_arrival_ns = 0
         self._accepting: Drawing | None = None
@@ -216,15 +127,15 @@ class Pilot:
 
     def autopilot(self, status: AutopilotStatus, arrival_ns: int) -> None:
         """Who flies, as shown beside the picture."""
-        self._coming_status.append((arrival_ns, status))
+        self._statuses.show(status, arrival_ns)
 
     def suggestion(self, suggestion: Suggestion, arrival_ns: int) -> None:
         """A path that is drawn into the picture from now on."""
-        self._coming_suggestions.append((arrival_ns, suggestion))
+        self._suggestions.show(suggestion, arrival_ns)
 
     def vehicle(self, status: VehicleStatus, arrival_ns: int) -> None:
         """The vehicle's state, as shown beside the picture."""
-        self._coming_vehicle.append((arrival_ns, status))
+        self._vehicles.show(status, arrival_ns)
 
     def answered(self, action: DecideAction, ok: bool) -> None:
         """What became of a decision."""
@@ -284,32 +195,33 @@ class Pilot:
         missing = [
             name
             for name, known in (
-                ("vehicle", self._is_fresh(self._vehicle, "vehicle", now_ns)),
-                ("autopilot", self._is_fresh(self._status, "autopilot", now_ns)),
+                ("vehicle", self._is_fresh(self._vehicles.newest, "vehicle", now_ns)),
+                ("autopilot", self._is_fresh(self._statuses.newest, "autopilot", now_ns)),
                 ("truth", self._sight is not None),
             )
             if not known
         ]
-        if missing or self._vehicle is None:
+        vehicle = self._vehicle
+        if missing or vehicle is None:
             self._note(note=f"no {', '.join(missing)}")
             return None
-        if self._vehicle[1].world != self._route.world:
-            self._note(note=f"the vehicle is in world {self._vehicle[1].world}")
+        if vehicle.world != self._route.world:
+            self._note(note=f"the vehicle is in world {vehicle.world}")
             return None
-        full = full_stick_of(self._vehicle[1])
+        full = full_stick_of(vehicle)
         if not full.moves_every_way:
-            self._note(note=f"a {self._vehicle[1].plant} cannot move every way as a drone does")
+            self._note(note=f"a {vehicle.plant} cannot move every way as a drone does")
             return None
         self._full = full
         self._begin_ns = now_ns
-        if self._vehicle[1].state == "flying":
+        if vehicle.state == "flying":
             self._enter(Phase.CLIMBING, now_ns)
             return None
         self._enter(Phase.TAKING_OFF, now_ns)
         return Decision("takeoff")
 
     def _take_off(self, now_ns: int) -> Decision | None:
-        if self._vehicle is not None and self._vehicle[1].state == "flying":
+        if self._vehicle is not None and self._vehicle.state == "flying":
             self._enter(Phase.CLIMBING, now_ns)
         elif self._lasted_s(now_ns) > AGAIN_S and self._has_come_down():
             self._enter(Phase.TAKING_OFF, now_ns)
@@ -388,11 +300,11 @@ class Pilot:
         return None
 
     def _watch(self, now_ns: int) -> Decision | None:
-        status = self._status
         # What he sees now may still be from before the autopilot took over.
         settled_ns = self._since_ns + nanoseconds(self._person.reaction_s + 0.2)
-        if status is not None and status[0] > settled_ns and status[1].mode != "engaged":
-            self._enter(Phase.STEERING, now_ns, f"autopilot: {status[1].reason}")
+        status = self._status_since(settled_ns)
+        if status is not None and status.mode != "engaged":
+            self._enter(Phase.STEERING, now_ns, f"autopilot: {status.reason}")
             return None
         sight = self._sight
         if sight is None or self._sight_ns != now_ns:
@@ -418,15 +330,12 @@ class Pilot:
         return Decision("land")
 
     def _land(self, now_ns: int) -> Decision | None:
-        if self._vehicle is not None and self._vehicle[1].state == "landed":
+        state = None if self._vehicle is None else self._vehicle.state
+        if state == "landed":
             self._enter(Phase.DONE, now_ns)
-        elif self._vehicle is not None and self._vehicle[1].state == "emergency":
+        elif state == "emergency":
             self._enter(Phase.FAILED, now_ns, "emergency")
-        elif (
-            self._lasted_s(now_ns) > AGAIN_S
-            and self._vehicle is not None
-            and self._vehicle[1].state == "flying"
-        ):
+        elif state == "flying" and self._lasted_s(now_ns) > AGAIN_S:
             self._enter(Phase.LANDING, now_ns)
             return Decision("land")
         return None
@@ -434,11 +343,8 @@ class Pilot:
     # --- what he thinks --------------------------------------------------------------------------
 
     def _perceive(self, now_ns: int) -> None:
-        seen_ns = now_ns - nanoseconds(self._person.reaction_s)
-        while self._coming_vehicle and self._coming_vehicle[0][0] <= seen_ns:
-            self._vehicle = self._coming_vehicle.popleft()
-        while self._coming_status and self._coming_status[0][0] <= seen_ns:
-            self._status = self._coming_status.popleft()
+        self._vehicles.notice(now_ns)
+        self._statuses.notice(now_ns)
         if now_ns - self._sight_ns >= nanoseconds(GLANCE_S - self._period_s / 2.0):
             self._sight_ns = now_ns
             self._sight = self._eyes.look(now_ns, self._lane.place.along_m)
@@ -446,8 +352,7 @@ class Pilot:
             laps = int((self._lane.place.along_m + self._slack_m()) / self._route.length_m)
             if laps > self.progress.laps:
                 self._note(laps=laps)
-        while self._coming_suggestions and self._coming_suggestions[0][0] <= seen_ns:
-            arrival_ns, suggestion = self._coming_suggestions.popleft()
+        for arrival_ns, suggestion in self._suggestions.notice(now_ns):
             self._note(suggestions=self.progress.suggestions + 1)
             if self._sight is not None:
                 self._drawing = drawing_of(suggestion, self._sight, now_ns)
@@ -516,23 +421,28 @@ class Pilot:
         return laps > 0 and self._lane.place.along_m > (laps - 1) * self._route.length_m
 
     def _is_engaged_since(self, since_ns: int) -> bool:
-        return (
-            self._status is not None
-            and self._status[0] > since_ns
-            and self._status[1].mode == "engaged"
-        )
+        status = self._status_since(since_ns)
+        return status is not None and status.mode == "engaged"
 
     def _is_not_obeyed(self) -> bool:
         """Whether he sees that somebody else flies though he has been steering for a while."""
         settled_ns = self._since_ns + nanoseconds(self._person.reaction_s + UNHEEDED_S)
-        return (
-            self._status is not None
-            and self._status[0] > settled_ns
-            and self._status[1].mode == "hover"
-        )
+        status = self._status_since(settled_ns)
+        return status is not None and status.mode == "hover"
 
     def _has_come_down(self) -> bool:
-        return self._vehicle is not None and self._vehicle[1].state in ("landed", "emergency")
+        return self._vehicle is not None and self._vehicle.state in ("landed", "emergency")
+
+    @property
+    def _vehicle(self) -> VehicleStatus | None:
+        """The vehicle's state as far as he has noticed."""
+        newest = self._vehicles.newest
+        return None if newest is None else newest[1]
+
+    def _status_since(self, since_ns: int) -> AutopilotStatus | None:
+        """Who flies as far as he has noticed; None if the newest he knows was shown before then."""
+        newest = self._statuses.newest
+        return newest[1] if newest is not None and newest[0] > since_ns else None
 
     def _is_fresh(self, seen: tuple[int, object] | None, topic: str, now_ns: int) -> bool:
         max_age_s = TOPICS[topic].max_age_s + self._person.reaction_s

@@ -9,7 +9,8 @@ from common.node import Node
 from common.topics import TOPICS
 from services.operator.config import Config
 from services.operator.decisions import Decisions
-from services.operator.pilot import Person, Pilot
+from services.operator.person import Person
+from services.operator.pilot import Pilot
 from services.operator.route import Route, route_of
 from services.operator.sources import Output, Reading, Sources
 

@@ -33,7 +33,8 @@ from services.classifier.core import Classifier
 from services.classifier.model import OnnxModel
 from services.localizer.config import Config as LocalizerConfig
 from services.localizer.core import Localizer
-from services.operator.pilot import Person, Pilot
+from services.operator.person import Person
+from services.operator.pilot import Pilot
 from services.operator.route import route_of
 from services.sim.cameras import SIZES, Shot, cameras_of
 from services.sim.config import Config, FrontSize

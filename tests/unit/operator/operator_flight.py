@@ -15,7 +15,8 @@ from common.messages import (
     Suggestion,
     VehicleStatus,
 )
-from services.operator.pilot import Decision, Person, Pilot
+from services.operator.person import Decision, Person
+from services.operator.pilot import Pilot
 from services.operator.route import Route
 from services.operator.sources import Deflection
 

@@ -14,7 +14,7 @@ import worlds
 from common.frames import quaternion_of
 from common.messages import Pose
 from services.operator.eyes import SIGHT_M, Eyes
-from services.operator.pilot import Person, Phase
+from services.operator.person import Person, Phase
 from services.operator.route import Route, route_of
 
 TRACK = route_of(worlds.load("track"))

@@ -10,7 +10,7 @@ from operator_offers import GoodOffers, circle_from, line_from, suggestion_of
 
 import worlds
 from common.messages import Suggestion
-from services.operator.pilot import Person, Phase
+from services.operator.person import Person, Phase
 from services.operator.route import route_of
 from services.operator.sources import NEUTRAL
 

@@ -7,7 +7,7 @@ from services.autopilot.config import Config as AutopilotConfig
 from services.autopilot.core import Autopilot
 from services.localizer.config import Config as LocalizerConfig
 from services.localizer.core import Localizer
-from services.operator.pilot import Decision
+from services.operator.person import Decision
 from services.operator.sources import Deflection
 from services.sim.config import Config as SimConfig
 from services.sim.core import Simulation
