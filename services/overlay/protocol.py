@@ -100,6 +100,8 @@ class State(msgspec.Struct, frozen=True, tag_field="type", tag="state"):
     world: str
     pose_status: str
     ages_s: dict[str, float | None]
+    stale: list[str]
+    """Those of `ages_s` whose newest message is too old to count."""
     alive: list[str]
     linked: bool
     pad: Standing

@@ -115,6 +115,7 @@ def _state(node: Node, core: Overlay, alive: list[str], pad: Standing) -> protoc
         world=vehicle.world if vehicle else "",
         pose_status=core.pose_status(now_ns),
         ages_s={topic: core.age_s(topic, now_ns) for topic in AGES_SHOWN},
+        stale=[topic for topic in AGES_SHOWN if not core.is_fresh(topic, now_ns)],
         alive=alive,
         linked=node.bus.linked(),
         pad=pad,

@@ -226,6 +226,12 @@ class TestConsole:
         assert "overlay" in state["alive"]
         assert all(age_s < 2.0 for age_s in state["ages_s"].values())
 
+    def test_what_is_too_old_to_count_is_named(self, world, streams, page):
+        page.next_state(lambda s: not s["stale"])
+        streams.close()
+        state = page.next_state(lambda s: "vehicle" in s["stale"])
+        assert state["stale"] == ["camera/front", "pose", "stick", "autopilot", "vehicle"]
+
     def test_a_page_that_shows_nothing_gets_few_pictures_and_slows_nobody(
         self, world, page, console_port
     ):

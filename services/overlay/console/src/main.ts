@@ -8,7 +8,7 @@ import { Video } from "./video";
 import { View, element } from "./view";
 
 const view = new View();
-const video = new Video(element<HTMLCanvasElement>("picture"));
+const video = new Video(element("picture", HTMLCanvasElement));
 let state: State | null = null;
 
 const connection = new Connection({
@@ -40,18 +40,19 @@ function mark(): void {
   connection.send({ type: "mark" });
 }
 
-for (const action of ["accept", "cancel", "takeoff", "land", "emergency"] as const) {
-  element<HTMLButtonElement>(action).addEventListener("click", (event) => {
-    act(action);
+function onPress(id: string, press: () => void): void {
+  const button = element(id, HTMLButtonElement);
+  button.addEventListener("click", () => {
+    press();
     // Enter and space are keys to fly by, not to press the last button again.
-    (event.currentTarget as HTMLElement).blur();
+    button.blur();
   });
 }
 
-element<HTMLButtonElement>("mark").addEventListener("click", (event) => {
-  mark();
-  (event.currentTarget as HTMLElement).blur();
-});
+for (const action of ["accept", "cancel", "takeoff", "land", "emergency"] as const) {
+  onPress(action, () => act(action));
+}
+onPress("mark", mark);
 
 const stage = element("stage");
 element("picture").addEventListener("dblclick", () => {

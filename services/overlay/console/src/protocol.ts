@@ -25,6 +25,7 @@ export interface State {
   world: string;
   pose_status: string;
   ages_s: Record<string, number | null>;
+  stale: string[];
   alive: string[];
   linked: boolean;
   pad: "free" | "yours" | "busy" | "stale";

@@ -1,17 +1,17 @@
 import type { Answer, State } from "./protocol";
 
-const STALE_S: Record<string, number> = {
-  "camera/front": 0.5,
-  pose: 0.2,
-  stick: 0.2,
-  autopilot: 0.5,
-  vehicle: 1,
-};
+const PICTURE_GONE_S = 1;
+const ANSWER_SHOWN_MS = 4000;
+/** A charge below this is a warning, as in the picture's strip. */
+const BATTERY_LOW = 0.2;
 
-export function element<E extends HTMLElement>(id: string): E {
+/** The page's element with an id, of a kind if one is given. */
+export function element(id: string): HTMLElement;
+export function element<E extends HTMLElement>(id: string, kind: new () => E): E;
+export function element(id: string, kind = HTMLElement): HTMLElement {
   const found = document.getElementById(id);
-  if (found === null) throw new Error(`the page has no #${id}`);
-  return found as E;
+  if (!(found instanceof kind)) throw new Error(`the page has no ${kind.name} #${id}`);
+  return found;
 }
 
 function percent(fraction: number): string {
@@ -56,7 +56,7 @@ export class View {
       ...state.alive.map((name) => Object.assign(document.createElement("li"), { textContent: name })),
     );
     const age_s = state.ages_s["camera/front"] ?? null;
-    this.veil(age_s !== null && age_s < 1 ? "" : "Waiting for pictures");
+    this.veil(age_s !== null && age_s < PICTURE_GONE_S ? "" : "Waiting for pictures");
     if (performance.now() > this.answerUntil_ms) element("answer").textContent = "";
   }
 
@@ -69,7 +69,7 @@ export class View {
     const line = element("answer");
     line.textContent = `${answer.ok ? "Done" : "Refused"}: ${answer.reason.replaceAll("_", " ")}`;
     line.dataset["ok"] = String(answer.ok);
-    this.answerUntil_ms = performance.now() + 4000;
+    this.answerUntil_ms = performance.now() + ANSWER_SHOWN_MS;
   }
 
   problem(error: string): void {
@@ -87,7 +87,7 @@ export class View {
         ? `${percent(offer.confidence)} sure, ${offer.speed_mps.toFixed(1)} m/s, fit ${(100 * offer.fit_rms_m).toFixed(0)} cm`
         : "Fly a shape for two seconds.";
     element("offer-advice").textContent = state.advice;
-    element<HTMLButtonElement>("accept").disabled = offer === null || engaged;
+    element("accept", HTMLButtonElement).disabled = offer === null || engaged;
   }
 
   private intent(state: State): void {
@@ -117,18 +117,18 @@ export class View {
       [
         "battery",
         state.battery === null ? "unknown" : percent(state.battery),
-        state.battery !== null && state.battery < 0.2,
+        state.battery !== null && state.battery < BATTERY_LOW,
       ],
       ["collisions", String(state.collisions), state.collisions > 0],
       ["pose", state.pose_status, state.pose_status !== "ok"],
     ]);
     this.list(
       "ages",
-      Object.entries(STALE_S).map(([topic, limit_s]) => {
-        const age_s = state.ages_s[topic] ?? null;
-        const isBad = age_s === null || age_s > limit_s;
-        return [topic.replace("/", " "), ago(age_s), isBad];
-      }),
+      Object.entries(state.ages_s).map(([topic, age_s]) => [
+        topic.replace("/", " "),
+        ago(age_s),
+        state.stale.includes(topic),
+      ]),
     );
   }
 
