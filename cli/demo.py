@@ -24,7 +24,6 @@ from services.operator.config import Config as OperatorConfig
 from studies.mission import Figures, MissionRecord
 
 WORLD = "track"
-START_TIMEOUT_S = 60.0
 MISSION_TIMEOUT_S = 240.0
 MISSION_DONE = "mission done"
 """The scripted operator's health says so when it has landed."""
@@ -39,9 +38,11 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--seed", metavar="N", type=opts.seed, help="of the operator's hand and eyes (1)"
     )
     opts.add_local_system(parser)
-    parser.epilog = (
-        "Example: 'autocomplete demo', then open http://localhost:8080;"
-        " 'autocomplete demo --once --json' for the figures of one lap."
+    opts.add_examples(
+        parser,
+        "autocomplete demo                  # then open http://localhost:8080",
+        "autocomplete demo --once --json    # the figures of one lap",
+        "autocomplete demo --console-port 8090 --record",
     )
     parser.set_defaults(action=_run)
 
@@ -85,10 +86,9 @@ class Observer:
         return self.operator_says.startswith(MISSION_DONE)
 
 
-def _status(observer: Observer, system: launch.System) -> Table:
+def _status(observer: Observer) -> Table:
     record = observer.record
     table = Table.grid(padding=(0, 2))
-    table.add_row("console", system.console)
     table.add_row("services", f"{len(observer.alive)} alive: {', '.join(sorted(observer.alive))}")
     table.add_row("mode", record.mode)
     table.add_row("laps", f"{record.laps:.2f}")
@@ -136,6 +136,8 @@ def _run(options: argparse.Namespace) -> int:
         },
     }
     with launch.running_as_asked(options, settings) as system:
+        if not options.json:
+            launch.say_where(system)
         bus = open_bus(stop, system.endpoint)
         figures = None if bus is None else _observe(bus, system, stop, options.once)
         if not options.once:
@@ -158,9 +160,9 @@ def _observe(bus: Bus, system: launch.System, stop: threading.Event, once: bool)
     observer = Observer(bus, system.vehicle)
     try:
         with console.status("starting the services"):
-            launch.wait_alive(system, observer.alive, list(system.configs), stop, START_TIMEOUT_S)
+            launch.wait_alive(system, observer.alive, list(system.configs), stop)
         with Live(
-            get_renderable=lambda: _status(observer, system),
+            get_renderable=lambda: _status(observer),
             console=console,
             refresh_per_second=4,
             transient=True,

@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import urllib.request
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,20 +19,24 @@ from rich.table import Table
 
 from cli import launch
 from cli import options as opts
-from cli.link import linked
+from cli.link import alive_services, linked
 from common.clock import sleep
-from common.network import ROUTER_PORT
-from common.topics import SERVICES, alive_key_of
+from common.network import DEFAULT_ENDPOINT, ROUTER_PORT
+from common.topics import SERVICES
 from services.overlay.config import Config as OverlayConfig
 
-State = Literal["ok", "warn", "fail"]
+State = Literal["ok", "note", "warn", "fail"]
+"""`note`: not here, and nothing that flies needs it."""
 OLDEST_PYTHON = (3, 11)
 OLDEST_NODE = 20
 COMMAND_TIMEOUT_S = 10.0
 TOKENS_WAIT_S = 0.5
-_COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
+PAGE_TIMEOUT_S = 1.0
+_COLOURS = {"ok": "green", "note": "dim", "warn": "yellow", "fail": "red"}
 _PROJECT = "autocomplete-teleoperation"
-_EXTRAS = (*SERVICES, "training", "test", "check")
+_FOLDER = Path(__file__).parents[1]
+_USES = {"training": "to train", "test": "to run the tests", "check": "to run make check"}
+"""What the extras are for that no flight needs."""
 
 
 @dataclass(frozen=True)
@@ -82,16 +87,24 @@ def _is_installed(package: str) -> bool:
     return True
 
 
+def _pip() -> str:
+    """This Python's pip, as it is typed in the project's folder."""
+    pip = Path(sys.executable).with_name("pip")
+    return str(pip.relative_to(_FOLDER) if pip.is_relative_to(_FOLDER) else pip)
+
+
 def _packages() -> Iterator[Finding]:
-    for extra in _EXTRAS:
+    for extra in (*SERVICES, *_USES):
         missing = [name for name in _requirements_of(extra) if not _is_installed(name)]
         subject = f"packages of {extra}"
         if not missing:
             yield Finding(subject, "ok", ", ".join(_requirements_of(extra)) or "nothing of its own")
             continue
         # A machine may run a part of the chain, so a missing part is no failure.
-        mend = f"to run it here: pip install -c constraints.txt -e '.[{extra}]'"
-        yield Finding(subject, "warn", f"{', '.join(missing)} missing", mend)
+        use = _USES.get(extra, "to run it here")
+        mend = f"{use}: {_pip()} install -c constraints.txt -e '.[{extra}]'"
+        state: State = "note" if extra in _USES else "warn"
+        yield Finding(subject, state, f"{', '.join(missing)} missing", mend)
 
 
 def _renderer() -> Finding:
@@ -129,7 +142,7 @@ def _output_of(*command: str) -> str | None:
 
 
 def _node() -> Finding:
-    page = Path(__file__).parents[1] / "services/overlay/console/dist/index.html"
+    page = _FOLDER / "services/overlay/console/dist/index.html"
     built = "the console is built" if page.is_file() else "the console is its plain page"
     version = _output_of("node", "--version")
     npm = _output_of("npm", "--version")
@@ -151,7 +164,7 @@ def _chromium() -> Finding:
         if version is not None:
             return Finding("Chromium", "ok", version)
     return Finding(
-        "Chromium", "warn", "none; the tests of the page are skipped", "apt-get install chromium"
+        "Chromium", "note", "none; the tests of the page are skipped", "apt-get install chromium"
     )
 
 
@@ -160,57 +173,70 @@ def _docker() -> Finding:
     if version:
         return Finding("Docker", "ok", f"engine {version}")
     if shutil.which("docker") is None:
-        return Finding("Docker", "warn", "none", "only docker compose needs it")
-    return Finding("Docker", "warn", "the engine does not answer", "only docker compose needs it")
+        return Finding("Docker", "note", "none", "only docker compose needs it")
+    return Finding("Docker", "note", "the engine does not answer", "only docker compose needs it")
 
 
 def _model() -> Finding:
-    folder = Path(__file__).parents[1] / "models"
+    folder = _FOLDER / "models"
     found = sorted(path.name for path in folder.glob("*.onnx"))
     if found:
         return Finding("model", "ok", ", ".join(found))
     return Finding("model", "fail", f"no .onnx file in {folder}", "make train")
 
 
-def _port(number: int, use: str, mend: str) -> Finding:
-    if launch.is_free(number):
-        return Finding(f"port {number}", "ok", f"free for {use}")
-    return Finding(f"port {number}", "warn", f"taken; {use} cannot have it", mend)
-
-
-def _ports() -> Iterator[Finding]:
-    yield _port(ROUTER_PORT, "a router", "right if a router runs here already")
-    yield _port(
-        OverlayConfig.console_port,
-        "the console",
-        "right if the console runs here already; else demo --console-port 8090",
+def _console_port() -> Finding:
+    port = OverlayConfig.console_port
+    subject = f"port {port}"
+    if launch.is_free(port):
+        return Finding(subject, "ok", "free for the console")
+    try:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=PAGE_TIMEOUT_S) as page:
+            is_ours = b"Autocomplete" in page.read()
+    except (OSError, ValueError):
+        is_ours = False
+    if is_ours:
+        return Finding(subject, "ok", f"the console is at http://localhost:{port}")
+    return Finding(
+        subject,
+        "warn",
+        "taken by another program",
+        "put the console elsewhere: --console-port 8090",
     )
 
 
+def _router_port(is_ours: bool) -> Finding:
+    subject = f"port {ROUTER_PORT}"
+    if launch.is_free(ROUTER_PORT):
+        return Finding(subject, "ok", "free for a router")
+    if is_ours:
+        return Finding(subject, "ok", "the router's")
+    mend = "right if a router runs here already; else 'autocomplete router --listen' another one"
+    return Finding(subject, "warn", "taken", mend)
+
+
 def _network(options: argparse.Namespace) -> Iterator[Finding]:
-    alive: set[str] = set()
-
-    def note(key: str, there: bool) -> None:
-        if there:
-            alive.add(key.rsplit("/", 1)[1])
-
     try:
         with linked(options) as bus:
-            bus.watch(alive_key_of(options.vehicle, "*"), note)
+            alive = alive_services(bus, options.vehicle)
             sleep(TOKENS_WAIT_S)
+            there = sorted(alive)
     except OSError:
+        # On this machine it is started with the first flight; elsewhere somebody expects it.
+        state: State = "note" if options.connect == DEFAULT_ENDPOINT else "warn"
         mend = "right if nothing is to run yet; else 'autocomplete router', or name it: --connect"
-        yield Finding("router", "warn", f"none at {options.connect}", mend)
+        yield Finding("router", state, f"none at {options.connect}", mend)
         return
     yield Finding("router", "ok", options.connect)
-    missing = [service for service in SERVICES if service not in alive]
+    # Nobody needs a recorder to fly.
+    missing = [service for service in SERVICES if service not in (*there, "recorder")]
     subject = f"services of {options.vehicle}"
     if not missing:
-        yield Finding(subject, "ok", "all alive")
+        without = "" if "recorder" in there else "; none records"
+        yield Finding(subject, "ok", f"all alive{without}")
         return
-    there = f"{', '.join(sorted(alive)) or 'none'} alive"
     mend = f"start {', '.join(missing)} with 'autocomplete run', or all with 'autocomplete up'"
-    yield Finding(subject, "warn", there, mend)
+    yield Finding(subject, "warn", f"{', '.join(there) or 'none'} alive", mend)
 
 
 def findings(options: argparse.Namespace) -> Iterator[Finding]:
@@ -219,17 +245,23 @@ def findings(options: argparse.Namespace) -> Iterator[Finding]:
         single: Callable[[], Finding] = check
         yield single()
     yield from _packages()
-    yield from _ports()
-    yield from _network(options)
+    router, *services = _network(options)
+    yield _router_port(router.state == "ok" and options.connect == DEFAULT_ENDPOINT)
+    yield _console_port()
+    yield router
+    yield from services
 
 
 def _run(options: argparse.Namespace) -> int:
     table = Table.grid(padding=(0, 2))
-    failed = False
+    states: set[State] = set()
     for finding in findings(options):
-        failed = failed or finding.state == "fail"
+        states.add(finding.state)
         colour = _COLOURS[finding.state]
         text = escape(finding.text) + (f"\n[dim]{escape(finding.mend)}[/]" if finding.mend else "")
         table.add_row(f"[{colour}]{finding.state}[/]", finding.subject, text)
-    Console().print(table)
-    return 1 if failed else 0
+    console = Console()
+    console.print(table)
+    if states <= {"ok", "note"}:
+        console.print("Ready: 'autocomplete demo' flies by itself, 'autocomplete up' is for you.")
+    return 1 if "fail" in states else 0

@@ -9,12 +9,15 @@ from typing import Any
 import msgspec
 
 from cli import options as opts
-from cli.link import linked
+from cli.link import alive_services, linked
 from common import messages as m
+from common.clock import SystemClock, nanoseconds
 from common.run import stop_on_signals
-from common.topics import TOPICS, key_of
+from common.topics import TOPICS, Topic, key_of
 
 POLL_S = 0.2
+SILENT_S = 3.0
+"""After so long without a message, whoever waits for the first one is told why it may not come."""
 BEHIND = 1000
 """Messages that wait at most for a slow terminal."""
 
@@ -50,6 +53,17 @@ def summary(message: m.Message) -> dict[str, Any]:
     }
 
 
+def silence(topic: Topic, vehicle: str, is_alive: bool) -> str:
+    """Why nothing comes, in a line; `is_alive` says so of the topic's publisher."""
+    key = key_of(vehicle, topic.name)
+    if is_alive:
+        return f"{key}: nothing yet; {topic.publisher} runs and has sent none"
+    return (
+        f"{key}: nothing yet; no {topic.publisher} of {vehicle} runs"
+        " ('autocomplete doctor' tells what does, --vehicle names another one)"
+    )
+
+
 def _run(options: argparse.Namespace) -> int:
     topic = TOPICS[options.topic]
     arrived: queue.Queue[bytes] = queue.Queue(BEHIND)
@@ -61,12 +75,21 @@ def _run(options: argparse.Namespace) -> int:
     with linked(options) as bus:
         stop = stop_on_signals()
         bus.subscribe(key_of(options.vehicle, topic.name), receive, video=topic.is_video)
-        shown = 0
+        alive = alive_services(bus, options.vehicle)
+        clock = SystemClock()
+        told_at_ns = clock.monotonic_ns() + nanoseconds(SILENT_S)
+        shown, is_told = 0, False
         while not stop.is_set() and shown != options.count:
             try:
                 payload = arrived.get(timeout=POLL_S)
             except queue.Empty:
+                if not is_told and clock.monotonic_ns() > told_at_ns:
+                    sys.stderr.write(
+                        silence(topic, options.vehicle, topic.publisher in alive) + "\n"
+                    )
+                    is_told = True
                 continue
+            is_told = True
             try:
                 message = m.decode(payload, topic.message)
             except m.InvalidPayloadError as error:

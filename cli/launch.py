@@ -15,12 +15,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rich.console import Console
+
 from common import config
 from common.clock import SystemClock, nanoseconds, sleep
 from common.network import ROUTER_PORT
 from common.run import ENDS_WITH_STDIN, config_type_of
 from common.topics import DEFAULT_VEHICLE, SERVICES
 
+START_TIMEOUT_S = 60.0
 STOP_TIMEOUT_S = 6.0
 
 
@@ -202,8 +205,23 @@ def running_as_asked(
     )
 
 
+def say_where(system: System) -> None:
+    """Tell a person where to find what has been started."""
+    console = Console(stderr=True, highlight=False)
+    console.print(f"console    {system.console}")
+    console.print(f"router     {system.endpoint}")
+    if "recorder" in system.configs:
+        console.print(f"recording  into {Path(system.configs['recorder'].folder).resolve()}")
+    console.print(f"logs       {system.logs}")
+    console.print("Ctrl-C stops everything.")
+
+
 def wait_alive(
-    system: System, alive: set[str], wanted: Sequence[str], stop: threading.Event, timeout_s: float
+    system: System,
+    alive: set[str],
+    wanted: Sequence[str],
+    stop: threading.Event,
+    timeout_s: float = START_TIMEOUT_S,
 ) -> None:
     """Wait until all wanted services are in `alive`, which somebody else fills.
 

@@ -5,10 +5,24 @@ import contextlib
 import threading
 from collections.abc import Iterator
 
+from common.bus import Bus
+from common.topics import alive_key_of
 from common.zenoh_bus import ZenohBus, open_bus
 
 LINK_TIMEOUT_S = 3.0
 """A router on the other side of the world answers within this."""
+
+
+def alive_services(bus: Bus, vehicle: str) -> set[str]:
+    """The services of a vehicle that run, kept up to date by the bus."""
+    alive: set[str] = set()
+
+    def note(key: str, there: bool) -> None:
+        service = key.rsplit("/", 1)[1]
+        (alive.add if there else alive.discard)(service)
+
+    bus.watch(alive_key_of(vehicle, "*"), note)
+    return alive
 
 
 @contextlib.contextmanager

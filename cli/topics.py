@@ -96,7 +96,10 @@ def table_of(snapshot: dict[str, Any]) -> Table:
     """A snapshot for people."""
     alive = ", ".join(snapshot["alive"]) or "nothing"
     title = f"{snapshot['vehicle']}: {alive} alive"
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    # A terminal of 80 columns holds it, pictures at a megabyte a second and all.
+    table = Table(
+        title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0)
+    )
     for heading in ("topic", "message", "from"):
         table.add_column(heading, no_wrap=True)
     for heading in ("rate Hz", "of", "age s", "kB/s"):

@@ -1,6 +1,7 @@
 """`autocomplete up`: all services on this machine, for a person at the console or a pad."""
 
 import argparse
+import contextlib
 from typing import get_args
 
 from rich.console import Console
@@ -8,8 +9,10 @@ from rich.console import Console
 import worlds
 from cli import launch
 from cli import options as opts
+from cli.link import alive_services
 from common.clock import sleep
 from common.run import stop_on_signals
+from common.zenoh_bus import open_bus
 from services.operator.config import Source
 
 
@@ -28,7 +31,12 @@ def declare(parser: argparse.ArgumentParser) -> None:
         help=f"whose sticks fly: {', '.join(get_args(Source))} (auto)",
     )
     opts.add_local_system(parser)
-    parser.epilog = "Then open http://localhost:8080, press 'take off', and fly."
+    opts.add_examples(
+        parser,
+        "autocomplete up                            # then open http://localhost:8080",
+        "autocomplete up --world gazebo --record",
+        "autocomplete up --source pad --config system.toml",
+    )
     parser.set_defaults(action=_run)
 
 
@@ -46,11 +54,18 @@ def _run(options: argparse.Namespace) -> int:
         "operator": {"source": options.source, "world": options.world},
     }
     with launch.running_as_asked(options, settings) as system:
-        console = Console(stderr=True)
-        console.print(f"console  {system.console}")
-        console.print(f"router   {system.endpoint}")
-        console.print(f"logs     {system.logs}")
-        console.print("Ctrl-C stops everything.")
+        launch.say_where(system)
+        bus = open_bus(stop, system.endpoint)
+        if bus is None:
+            return 0
+        with contextlib.closing(bus):
+            console = Console(stderr=True)
+            with console.status("starting the services"):
+                alive = alive_services(bus, system.vehicle)
+                launch.wait_alive(system, alive, list(system.configs), stop)
+        if not stop.is_set():
+            page = system.configs["overlay"].console_port and f"open {system.console}, "
+            console.print(f"ready: {page or ''}take off, and fly")
         while not stop.is_set():
             system.check()
             sleep(0.2)

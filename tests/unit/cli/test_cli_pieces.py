@@ -2,17 +2,20 @@
 
 import argparse
 import dataclasses
+import io
 import threading
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from cli import doctor, options
 from cli.contract import page
-from cli.echo import summary
+from cli.echo import silence, summary
 from cli.main import main
 from cli.meter import WINDOW_S, Meter
 from cli.run import _meanings_in, _service_in
+from cli.topics import table_of
 from common import messages as m
 from common.config import ConfigError
 from common.memory_bus import MemoryBus, MemoryNetwork
@@ -113,6 +116,41 @@ def test_the_doctor_knows_what_each_extra_installs() -> None:
     assert "mcap" in doctor._requirements_of("recorder")
     assert "torch" in doctor._requirements_of("training")
     assert "torch" not in doctor._requirements_of("classifier")
+
+
+def test_the_doctor_takes_what_no_flight_needs_for_no_fault(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(doctor, "_is_installed", lambda _: False)
+    states = {found.subject: found.state for found in doctor._packages()}
+    assert states["packages of sim"] == "warn"
+    assert {states[f"packages of {extra}"] for extra in ("training", "test", "check")} == {"note"}
+
+
+def test_who_waits_for_a_message_is_told_why_none_comes() -> None:
+    assert "no localizer of drone9 runs" in silence(TOPICS["pose"], "drone9", is_alive=False)
+    assert "runs and has sent none" in silence(TOPICS["suggestion"], "drone0", is_alive=True)
+
+
+def test_the_table_of_topics_fits_a_terminal_of_80_columns() -> None:
+    rows = [
+        {
+            "topic": topic.name,
+            "message": topic.message.__name__,
+            "publisher": topic.publisher,
+            "nominal_hz": topic.rate_hz,
+            "rate_hz": 200.5,
+            "age_s": 12.25,
+            "bytes_per_s": 12_345_600,
+            "count": 1,
+        }
+        for topic in TOPICS.values()
+    ]
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(table_of({"vehicle": "drone0", "alive": ["sim"], "topics": rows}))
+    text = console.export_text()
+    assert "…" not in text
+    assert text.count("12345.6") == len(TOPICS)
 
 
 def test_the_doctor_says_what_to_do_about_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
