@@ -303,8 +303,10 @@ class TestConsole:
         time.sleep(3.0)
         assert len([r for r in decider.requests if r["action"] == "accept"]) <= 2
 
-    def test_another_sites_page_is_not_let_in(self, overlay, console_port):
-        assert Page(console_port, origin="http://elsewhere.example").refused
+    @pytest.mark.parametrize("origin", ["http://elsewhere.example", "null", "http://[::1"])
+    def test_another_sites_page_is_not_let_in(self, overlay, console_port, origin):
+        assert Page(console_port, origin=origin).refused
+        assert "Traceback" not in overlay.log.read_text()
         ours = Page(console_port, origin=f"http://127.0.0.1:{console_port}")
         assert not ours.refused
         ours.leave()
