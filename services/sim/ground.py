@@ -15,6 +15,9 @@ from worlds import Strip, Texture
 PAINT_M = 0.003
 """Of each layer of paint, so that the upper hides the lower."""
 SIDE_M = 600.0
+"""What is drawn of it: it has no end, so it goes along with the camera."""
+STEP_M = 100.0
+"""How far it goes at once; within half of that around the world's middle it lies still."""
 LIGHT_PIXELS = 2048
 """2 to 3 cm each where a world is 60 m wide, so that the nearest one is enough: to blend four costs
 a quarter of the ground, and more of them no longer fit in a cache."""
@@ -46,6 +49,12 @@ class Ground:
             gl.program(shaders.PATCHES_VERTEX, shaders.PATCHES_FRAGMENT),
             [(gl.buffer(corners.tobytes()), "2f", "corner")],
         )
+        self._light = gl.texture((LIGHT_PIXELS, LIGHT_PIXELS), 1)
+        self._light.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._light.repeat_x = self._light.repeat_y = False
+        # One for all scenes: another framebuffer is made while the last one is bound, which must
+        # not have been released.
+        self._sunlit = gl.framebuffer([self._light])
         self._scene_objects: list[Any] = []
 
     def load(self, scene: Scene, cast_shadows: Callable[[Array], None]) -> None:
@@ -59,10 +68,11 @@ class Ground:
         for each in self._scene_objects:
             each.release()
         self._scene_objects = []
-        self._load_light(_window_of(scene), cast_shadows)
+        self._light_up(_window_of(scene), cast_shadows)
         half = SIDE_M / 2.0
         corners = np.asarray([(-half, -half), (half, -half), (-half, half), (half, half)])
         layers_up = [self._laid(corners, scene.ground)]
+        self._endless = layers_up[0]
         for strip in scene.strips:
             points, along_m = meshes.ribbon(strip)
             if strip.texture is None:
@@ -72,26 +82,27 @@ class Ground:
         # Top paint first and a little higher, so that it hides what is under it from painting.
         self._layers_down = [(PAINT_M * up, each) for up, each in enumerate(layers_up)][::-1]
 
-    def draw(self) -> None:
-        """Draw it."""
+    def draw(self, eye: Array) -> None:
+        """Draw it as it is seen from a place in the world, (3,)."""
         self._light.use(1)
-        for height_m, (program, vertices, paving, look) in self._layers_down:
+        moved_m = tuple(np.round(eye[:2] / STEP_M) * STEP_M)
+        for height_m, layer in self._layers_down:
+            program, vertices, paving, look = layer
             program["height_m"] = height_m
+            program["moved_m"] = moved_m if layer is self._endless else (0.0, 0.0)
             if paving is not None:
                 paving.use(0)
             for name, value in look.items():
                 program[name] = value
             vertices.render(moderngl.TRIANGLE_STRIP)
 
-    def _load_light(self, window: Array, cast_shadows: Callable[[Array], None]) -> None:
+    def _light_up(self, window: Array, cast_shadows: Callable[[Array], None]) -> None:
         """Paint the sun's shadows, and patches of light that hide the textures' repetition.
 
         Once is enough, since nothing that casts a shadow moves.
         """
         gl = self._gl
-        self._light = gl.texture((LIGHT_PIXELS, LIGHT_PIXELS), 1)
-        target = gl.framebuffer([self._light])
-        target.use()
+        self._sunlit.use()
         gl.enable_only(moderngl.NOTHING)
         self._patches.use(0)
         self._patches_all_over.render(moderngl.TRIANGLE_STRIP)
@@ -99,12 +110,8 @@ class Ground:
         gl.blend_equation = moderngl.MIN
         cast_shadows(window)
         gl.blend_equation = moderngl.FUNC_ADD
-        target.release()
-        self._light.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._light.repeat_x = self._light.repeat_y = False
         for program in (self.textured, self.painted):
             program["window"] = tuple(window)
-        self._scene_objects.append(self._light)
 
     def _laid(self, points: Array, texture: Texture) -> _Layer:
         """A layer of a texture, which lies flat on the world: it bends and stretches nowhere."""

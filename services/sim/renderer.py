@@ -98,7 +98,7 @@ class GlRenderer:
         focal_px = camera.lens.intrinsics[0]
         self._bodies.draw_opaque(away_m, focal_px, figures)
         gl.disable(moderngl.CULL_FACE)
-        self._ground.draw()
+        self._ground.draw(eye)
         gl.depth_func = "<="
         self._sky.draw(eye, from_world)
         gl.depth_func = "<"

@@ -121,12 +121,14 @@ _ON_GROUND = """
 #version 330
 uniform mat4 from_world;
 uniform float height_m;
+uniform vec2 moved_m;
 uniform vec4 window;
 in vec2 in_position;
 out vec2 in_light;
+vec2 placed() { return in_position + moved_m; }
 void place() {
-    in_light = (in_position - window.xy) * window.zw;
-    gl_Position = from_world * vec4(in_position, height_m, 1.0);
+    in_light = (placed() - window.xy) * window.zw;
+    gl_Position = from_world * vec4(placed(), height_m, 1.0);
 }
 """
 _LIT = f"""{_HAZE}
@@ -142,7 +144,7 @@ uniform vec2 per_m;
 out vec2 uv;
 void main() {{
     place();
-    uv = in_position * per_m;
+    uv = placed() * per_m;
 }}
 """
 GROUND_FRAGMENT = f"""

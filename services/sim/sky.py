@@ -14,7 +14,7 @@ SIDES, RINGS = 120, 20
 _CORNERS = np.asarray([(-1.0, -1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, 1.0), (-1.0, 1.0, 1.0)])
 """Of a picture: x, y and w in clip coordinates."""
 _GROUND_ENDS_M = 100.0
-"""From the eye at least, unless that is 200 m from the world's middle."""
+"""From the eye at least, see ground.py."""
 _RIM_RAD = math.pi / 4.0
 """Below the horizon, before SKY_VERTEX lays it on the edge of the ground."""
 _SEED = 20210

@@ -206,6 +206,38 @@ def test_the_ground_of_the_track_has_corners_everywhere(gl: Renderer) -> None:
     stage.close()
 
 
+def test_the_ground_goes_on_as_far_as_a_vehicle_may_be_put(gl: Renderer) -> None:
+    stage = Stage(load("track"), 0.001)
+    gl.load(stage.scene())
+    stage.close()
+    down = Camera("camera/down", Lens.of_view(320, 240, math.radians(53.13)), DOWN, 60.0)
+    for place in ((270.0, -20.0, 10.0), (1000.0, -1000.0, 2.0), (-1000.0, 340.0, 20.0)):
+        below = gl.draw(down, shot_at(place, 0.0, 0.0, 0.0)).reshape(-1, 3)
+        # Grass rather than haze: greener than it is blue.
+        assert (below[:, 1] > below[:, 0]).mean() > 0.8, place
+        ahead = gl.draw(FRONT_CAMERA, shot_at(place, 0.0, 0.0, 0.0))
+        # Down from what is 180 m away.
+        fy, _, cy = LENS.intrinsics[1:]
+        row = round(cy + fy * place[2] / 180.0)
+        below_horizon = ahead[row + 3 :].astype(int)
+        assert (below_horizon[..., 1] > below_horizon[..., 0]).mean() > 0.8, place
+
+
+def test_pictures_of_one_scene_after_the_other_leave_no_error_in_opengl() -> None:
+    try:
+        renderer = GlRenderer()
+    except NoOpenGlError as error:
+        pytest.skip(f"no OpenGL here: {error}")
+    for name, size in (("track", (64, 48)), ("empty", (32, 24)), ("track", (64, 48))):
+        stage = Stage(load(name), 0.001)
+        renderer.load(stage.scene())
+        stage.close()
+        camera = Camera("camera/front", Lens.of_view(*size, 1.0), FRONT, 30.0)
+        renderer.draw(camera, shot_at((0.0, 0.0, 1.0), 0.0, 0.0, 0.0))
+        assert renderer._gl.error == "GL_NO_ERROR"
+    renderer.close()
+
+
 def test_a_picture_survives_its_jpeg() -> None:
     ramp = np.tile(np.linspace(0, 255, 64, dtype=np.uint8), (48, 1))
     picture = np.dstack([ramp, ramp, ramp])
