@@ -27,7 +27,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         metavar="FOLDER",
-        type=Path,
+        type=opts.folder,
         default=Path("evaluation"),
         help="where results and report go, with --quick into quick/ in it (evaluation)",
     )

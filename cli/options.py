@@ -33,6 +33,18 @@ def existing_file(text: str) -> Path:
     return path
 
 
+def folder(text: str) -> Path:
+    """The path of a folder, there or to be made.
+
+    Raises:
+        argparse.ArgumentTypeError: if something else is there.
+    """
+    path = Path(text)
+    if path.exists() and not path.is_dir():
+        raise argparse.ArgumentTypeError(f"{text}: no folder; name another one")
+    return path
+
+
 def positive(text: str) -> int:
     """A count of 1 or more.
 

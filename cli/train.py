@@ -39,7 +39,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         metavar="FOLDER",
-        type=Path,
+        type=opts.folder,
         help="where intent.onnx, its card README.md and its figures go (models/; models/quick/ with"
         " --preset quick, models/finetuned/ with --finetune)",
     )
@@ -108,13 +108,12 @@ class _Bars:
         self._progress.update(self._tasks[text], completed=done, total=total)
 
 
-def _run(options: argparse.Namespace) -> int:
-    try:
-        from training.train import train
-    except ModuleNotFoundError as error:
-        raise OSError(
-            f"{error.name} is missing; install it with pip install -e '.[training]'"
-        ) from None
+def _require_one_job(options: argparse.Namespace) -> None:
+    """Refuse options that would say nothing of what is asked for.
+
+    Raises:
+        ValueError: if there is one.
+    """
     if options.resume and (options.finetune or options.ablation):
         raise ValueError("--resume goes on with a training; leave it or the other job out")
     if options.model is not None and options.finetune is None:
@@ -125,13 +124,22 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueError("--out is a model's folder; --ablation writes its page only")
     if options.seed is not None and options.ablation is not None:
         raise ValueError("--seed is of one model; --ablation has seeds of its own")
+
+
+def _run(options: argparse.Namespace) -> int:
+    # What is said wrongly is told before torch is loaded, which takes seconds.
+    _require_one_job(options)
+    if options.finetune is not None:
+        return _finetune(Console(), options)
+    try:
+        from training.train import train
+    except ModuleNotFoundError as error:
+        raise _missing(error) from None
     # Not argparse's defaults: what was said must be known, and it forgets what equals a default.
     seed, preset = options.seed or 0, options.preset or "shipped"
     console = Console()
     with counted(console) as progress:
         bars = _Bars(progress)
-        if options.finetune is not None:
-            return _finetune(console, options, seed, bars)
         if options.ablation is not None:
             return _ablation(console, options, bars)
         run = train(
@@ -146,20 +154,32 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _finetune(console: Console, options: argparse.Namespace, seed: int, bars: _Bars) -> int:
-    from training.dataset.check import load_sound
-    from training.finetune import finetune
+def _missing(error: ModuleNotFoundError) -> OSError:
+    return OSError(f"{error.name} is missing; install it with pip install -e '.[training]'")
 
-    primitives, findings = load_sound(options.finetune)
+
+def _finetune(console: Console, options: argparse.Namespace) -> int:
+    try:
+        from training.dataset.check import load_sound
+
+        primitives, findings = load_sound(options.finetune)
+        from training.finetune import finetune
+    except ModuleNotFoundError as error:
+        raise _missing(error) from None
     for finding in findings:
-        console.print(f"left out: {finding}")
+        # What is wrong with a person as a whole leaves nobody's rows out.
+        fate = "left out" if finding.row is not None else "look at this"
+        console.print(f"{fate}: {finding}", markup=False, soft_wrap=True)
     out = options.out or Path("models/finetuned")
     begin = options.model or SHIPPED_MODEL
-    done = finetune(primitives, begin, out, seed, bars.generating, options.operator)
+    with counted(console) as progress:
+        tell = _Bars(progress).generating
+        done = finetune(primitives, begin, out, options.seed or 0, tell, options.operator)
     learned = done.learned
     console.print(
         f"{done.performances} performances by {done.operator}: F1 {learned.before:.3f} before;"
-        f" {learned.after:.3f} after, on those left out of each of three adaptations"
+        f" {learned.after:.3f} after, on those left out of each of three adaptations",
+        markup=False,
     )
     if not learned.of_use:
         console.print("no more of them were named right than before, so the model stays as it was")

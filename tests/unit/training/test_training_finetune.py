@@ -224,6 +224,22 @@ def test_the_command_writes_a_model_of_its_own(
     assert len(error.splitlines()) == 1
 
 
+def test_faulty_performances_are_left_out_and_a_faulty_person_is_told_of(
+    base: Path, ana: list[Primitive], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = tmp_path / "ana.npz"
+    flat = [replace(one, sticks=one.sticks * [1.0, 0.0, 1.0, 1.0]) for one in ana]
+    hung = replace(flat[0], sticks=np.tile([0.5, 0.0, 0.0, 0.0], (len(flat[0]), 1)))
+    # Names are no markup.
+    save_set(own, [replace(one, operator="[/ana]") for one in (*flat, hung)])
+    command = ["train", "--finetune", str(own), "--model", str(base)]
+    assert main([*command, "--out", str(tmp_path / "ana")]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "left out: row 20: arc by [/ana]: every sample is the same" in told
+    assert "look at this: operator [/ana]: vy never moves in 21 primitives" in told
+    assert "20 performances by [/ana]: F1" in told
+
+
 def test_a_model_is_adapted_to_one_person_of_a_file(
     base: Path, ana: list[Primitive], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -180,7 +180,15 @@ def test_what_would_be_ignored_is_refused(
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--preset", "huge"], ["--seed", "-1"], ["--seed", "x"], ["--rate", "1"]]
+    "arguments",
+    [
+        ["--preset", "huge"],
+        ["--seed", "-1"],
+        ["--seed", "x"],
+        ["--rate", "1"],
+        ["--out", __file__],
+        ["--finetune", "ana.npz", "--out", __file__],
+    ],
 )
 def test_wrong_usage_is_one_line_and_2(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
