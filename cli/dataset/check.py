@@ -12,7 +12,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Looks at every primitive of a set: unknown labels, times that do not rise, gaps, sticks"
         " beyond [-1, 1] or not finite, too short, at rest, hanging, dead axes, the same twice."
-        " A line for each finding; exit code 1 if there is any."
+        " A line for each finding; exit code 1 if there is any. 'autocomplete train --finetune'"
+        " leaves such primitives out, 'dataset import FILE.npz --sound' writes a set without them."
     )
     opts.add_examples(
         parser,

@@ -14,7 +14,9 @@ from training.labels import NONE
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.add_argument("--out", metavar="FILE.npz", type=shared.set_file, required=True)
+    parser.add_argument(
+        "--out", metavar="FILE.npz", type=shared.set_file, required=True, help="the set to write"
+    )
     parser.add_argument(
         "--preset",
         choices=("wide", "thesis"),
@@ -59,6 +61,9 @@ def _run(options: argparse.Namespace) -> int:
     with shared.training_installed():
         from training.dataset.store import save
         from training.generator.dataset import THESIS, counts_of, generate, populate
+    # What is there may be somebody's performances, which no seed brings back.
+    if options.out.exists():
+        raise OSError(f"{options.out} is there already; choose another --out, or remove it")
     counts = counts_of(options.multiple)
     if options.none:
         counts[NONE] = options.none
@@ -78,5 +83,6 @@ def _run(options: argparse.Namespace) -> int:
         f" --multiple {options.multiple!r} --none {options.none} --seed {options.seed}"
     )
     save(options.out, primitives, {"made": made})
-    print(f"{options.out}: {len(primitives)} primitives by {options.operators} operators")
+    operators = len({one.operator for one in primitives})
+    print(f"{options.out}: {len(primitives)} primitives by {operators} operators")
     return 0

@@ -2,9 +2,11 @@
 
 import argparse
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from cli import options as opts
@@ -15,17 +17,24 @@ from training.labels import CLASSES, PRIMITIVES
 if TYPE_CHECKING:
     from training.dataset.lengths import Lengths, Limit
     from training.dataset.primitive import Primitive
-    from training.dataset.reading import Rules
+    from training.dataset.reading import Reading, Rules
 
 FORMATS = ("auto", "joy", "csv", "vectors", "mcap", "npz")
+NOT_OF_FLIGHTS = ("label", "buttons", "axes", "rate", "idle")
+"""Options that say what the sticks of a flight's suggestions say themselves."""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.add_argument("files", metavar="FILE", nargs="+", type=opts.existing_file)
-    parser.add_argument("--out", metavar="FILE.npz", type=shared.set_file, required=True)
+    parser.add_argument(
+        "--out", metavar="FILE.npz", type=shared.set_file, required=True, help="the set to write"
+    )
     parser.add_argument(
         "--append", action="store_true", help="add to --out where it is there already"
+    )
+    parser.add_argument(
+        "--sound", action="store_true", help="leave out what 'dataset check' would find fault with"
     )
     parser.add_argument(
         "--format",
@@ -179,6 +188,9 @@ def _lengths(options: argparse.Namespace) -> "Lengths":
         raise ValueError("--over and --pad need a --length to bring primitives to")
     if options.over is not None:
         lengths = replace(lengths, over=options.over)
+    shortest, longest = lengths.shortest, lengths.longest
+    if shortest.is_time == longest.is_time and shortest.amount > longest.amount:
+        raise ValueError(f"--shortest {shortest} is more than --longest {longest}: nothing is left")
     return replace(lengths, padded=lengths.padded or options.pad)
 
 
@@ -200,14 +212,60 @@ def _rules(options: argparse.Namespace) -> "Rules":
     return rules if options.rate is None else replace(rules, rate_hz=options.rate)
 
 
-def _run(options: argparse.Namespace) -> int:
+def _require_flights(options: argparse.Namespace) -> None:
+    """Refuse what would say nothing: labels, axes and cuts come from the flight itself."""
+    given = [f"--{name}" for name in NOT_OF_FLIGHTS if getattr(options, name) is not None]
+    if options.segmentation != "ours":
+        given.append("--segmentation")
+    if options.format not in ("auto", "mcap"):
+        given.append("--format")
+    if given:
+        raise ValueError(
+            f"{given[0]} says nothing of --from-flights, whose labels, axes and cuts are those of"
+            " the suggestions; leave one of the two out"
+        )
+
+
+def _read(path: Path, options: argparse.Namespace, rules: "Rules", console: Console) -> "Reading":
+    """What a file gives, or its one problem."""
     with shared.training_installed():
         from training.dataset.flights import read_flight
         from training.dataset.reading import Reading, at_lengths, operator_of, read_file
-        from training.dataset.store import open_set, save
         from training.dataset.track import Problem
+    try:
+        if not options.from_flights:
+            return read_file(path, rules, None if options.format == "auto" else options.format)
+        found, fates, problems = read_flight(
+            path,
+            operator_of(path, rules),
+            rules.family,
+            ignored_is_none=options.ignored_is_none,
+        )
+    except OSError as error:
+        return Reading([], [Problem("", "", str(error))])
+    told = ", ".join(f"{count} {fate}" for fate, count in fates.items())
+    text = f"{path.name}: suggestions: {told}"
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
+    return at_lengths(path, found, problems, rules.lengths)
+
+
+def _sound(primitives: "list[Primitive]") -> "list[Primitive]":
+    """Those that nothing is wrong with; what is wrong with the others is told."""
+    from training.dataset.check import sound_of
+
+    sound, findings = sound_of(primitives)
+    faults = [(primitives[each.row].source, each.text) for each in findings if each.row is not None]
+    shared.tell([f"{source}: {text}; left out" for source, text in faults])
+    return sound
+
+
+def _run(options: argparse.Namespace) -> int:
+    with shared.training_installed():
+        from training.dataset.store import open_set, save
     if options.ignored_is_none and not options.from_flights:
         raise ValueError("--ignored-is-none goes with --from-flights")
+    if options.from_flights:
+        _require_flights(options)
     rules = _rules(options)
     primitives: list[Primitive] = []
     provenance: dict[str, str] = {}
@@ -222,31 +280,18 @@ def _run(options: argparse.Namespace) -> int:
     taken = 0
     with counted(console) as progress:
         for path in progress.track(options.files, description="reading"):
-            try:
-                if options.from_flights:
-                    found, fates, problems = read_flight(
-                        path,
-                        operator_of(path, rules),
-                        rules.family,
-                        ignored_is_none=options.ignored_is_none,
-                    )
-                    reading = at_lengths(path, found, problems, rules.lengths)
-                    told = ", ".join(f"{count} {fate}" for fate, count in fates.items())
-                    console.print(f"{path.name}: suggestions: {told}", highlight=False)
-                else:
-                    file_format = None if options.format == "auto" else options.format
-                    reading = read_file(path, rules, file_format)
-            except OSError as error:
-                reading = Reading([], [Problem("", "", str(error))])
-            found = reading.primitives
+            reading = _read(path, options, rules, console)
             shared.tell(reading.problems)
-            labels = [p.label for p in found]
+            labels = [p.label for p in reading.primitives]
             counts = [str(labels.count(label)) for label in CLASSES]
-            table.add_row(path.name, *counts, str(len(reading.problems)))
-            primitives += found
-            taken += len(found)
+            table.add_row(escape(path.name), *counts, str(len(reading.problems)))
+            primitives += reading.primitives
+            taken += len(labels)
+            provenance = shared.joined(provenance, reading.made)
     console.print(table)
-    if not taken:
+    if options.sound:
+        primitives = _sound(primitives)
+    if not taken or not primitives:
         raise OSError("nothing of these files can be used, so nothing was written")
     save(options.out, primitives, shared.made(provenance, options))
     print(f"{options.out}: {len(primitives)} primitives")

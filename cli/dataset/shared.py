@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 PROBLEMS_SHOWN = 20
-"""Of each file; a wrong option makes every row of a file a problem."""
+"""Of each file, on a terminal; a wrong option makes every row of a file a problem."""
 
 
 @contextlib.contextmanager
@@ -61,16 +61,22 @@ def add_people(parser: argparse.ArgumentParser, operator_help: str, *, required:
 
 def made(before: Mapping[str, str], options: argparse.Namespace) -> dict[str, str]:
     """A set's provenance after this command, which is told with all its options."""
-    told, command = before.get("made", ""), shlex.join(options.words)
-    if f"; {told}".endswith(f"; {command}"):
+    return joined(before, shlex.join(options.words))
+
+
+def joined(before: Mapping[str, str], more: str) -> dict[str, str]:
+    """A provenance with more of the commands that a set was made by."""
+    told = before.get("made", "")
+    if not more or f"; {told}".endswith(f"; {more}"):
         return dict(before)
-    return {**before, "made": f"{told}; {command}" if told else command}
+    return {**before, "made": f"{told}; {more}" if told else more}
 
 
 def tell(problems: Sequence[object]) -> None:
-    """Write what was wrong with a file, a line each, to stderr."""
-    for problem in problems[:PROBLEMS_SHOWN]:
+    """Write what was wrong with a file, a line each, to stderr: all of it, if that is a file."""
+    shown = PROBLEMS_SHOWN if sys.stderr.isatty() else len(problems)
+    for problem in problems[:shown]:
         sys.stderr.write(f"{problem}\n")
-    more = len(problems) - PROBLEMS_SHOWN
+    more = len(problems) - shown
     if more > 0:
-        sys.stderr.write(f"... and {more} more like these\n")
+        sys.stderr.write(f"... and {more} more; 2> problems.txt writes all of them there\n")

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from cli import options as opts
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 GROUPS_SHOWN = 20
 """Generated sets have hundreds of operators."""
+FIGURES = (".png", ".pdf", ".svg")
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -25,8 +27,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--figure",
         metavar="FILE.png",
-        type=Path,
-        help="also draw the lengths by class, as the thesis' figure 4.1",
+        type=_figure,
+        help="also draw the lengths by class, as the thesis' figure 4.1, as .png, .pdf or .svg",
     )
     opts.add_examples(
         parser,
@@ -34,6 +36,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "autocomplete dataset stats *.npz --figure lengths.png",
     )
     parser.set_defaults(action=_run)
+
+
+def _figure(text: str) -> Path:
+    path = Path(text)
+    if path.suffix not in FIGURES or path.is_dir():
+        raise argparse.ArgumentTypeError(f"{text}: name a file that ends in {', '.join(FIGURES)}")
+    return path
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -47,18 +56,20 @@ def _run(options: argparse.Namespace) -> int:
     console = Console()
     total = group_of("all", primitives)
     console.print(_lengths([*by_class(primitives), total]))
-    console.print(_counts("family", grouped(primitives, lambda p: p.family or "unknown")))
-    console.print(_counts("operator", grouped(primitives, lambda p: p.operator)))
+    families = grouped(primitives, lambda p: p.family or "unknown")
+    console.print(_counts("family", families, with_operators=True))
+    people = grouped(primitives, lambda p: p.operator)
+    console.print(_counts("operator", people, with_operators=False))
     for one in stored:
         told = ", ".join(f"{name}: {text}" for name, text in sorted(one.provenance.items()))
-        console.print(f"{one.path}: {told}", highlight=False, soft_wrap=True)
+        console.print(f"{one.path}: {told}", markup=False, highlight=False, soft_wrap=True)
     if options.figure is not None:
         with shared.training_installed():
             from training.dataset.figures import draw_lengths
         names = ", ".join(path.name for path in options.files)
         title = f"Lengths of {len(primitives)} primitives: {names}"
         draw_lengths(primitives, options.figure, title)
-        console.print(f"figure: {options.figure}", highlight=False)
+        console.print(f"figure: {options.figure}", markup=False, highlight=False, soft_wrap=True)
     return 0
 
 
@@ -78,20 +89,21 @@ def _lengths(groups: "Sequence[Group]") -> Table:
     return table
 
 
-def _counts(kind: str, groups: "Sequence[Group]") -> Table:
+def _counts(kind: str, groups: "Sequence[Group]", *, with_operators: bool) -> Table:
     hidden = len(groups) - GROUPS_SHOWN
     more = f"and {hidden} more" if hidden > 0 else None
     table = Table(box=None, padding=(0, 2, 0, 0), caption=more)
     # Whole names, however long: --operator takes no others.
     table.add_column(kind, overflow="fold")
-    for name in ("n", *CLASSES, "operators", "samples", "Hz"):
+    people = ("operators",) if with_operators else ()
+    for name in ("n", *CLASSES, *people, "samples", "Hz"):
         table.add_column(name, justify="right")
     for group in groups[:GROUPS_SHOWN]:
         table.add_row(
-            group.name,
+            escape(group.name),
             str(group.count),
             *(str(group.counts[name]) for name in CLASSES),
-            str(group.operators),
+            *(str(group.operators) for _ in people),
             f"{group.samples[1]:.0f}",
             f"{group.rates_hz[1]:.0f}",
         )

@@ -66,6 +66,14 @@ def check_stored(stored: Stored) -> list[Finding]:
     return sorted(findings, key=lambda each: len(stored) if each.row is None else each.row)
 
 
+def sound_of(primitives: Sequence[Primitive]) -> tuple[list[Primitive], list[Finding]]:
+    """Those that nothing is wrong with, and what is wrong with the others, in their order."""
+    faulty = [finding for finding in check(primitives) if finding.row is not None]
+    rows = {finding.row for finding in faulty}
+    sound = [primitive for row, primitive in enumerate(primitives) if row not in rows]
+    return sound, sorted(faulty, key=lambda each: each.row or 0)
+
+
 def load_sound(path: Path) -> tuple[list[Primitive], list[Finding]]:
     """The primitives of a file that nothing is wrong with, and what is wrong with the others.
 

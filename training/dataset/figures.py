@@ -56,6 +56,10 @@ def draw_lengths(primitives: Sequence[Primitive], path: Path, title: str = "") -
     figure.suptitle(title, fontsize=10)
     figure.tight_layout()
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=130)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OSError(f"{path} cannot be written: {reason}; choose another file") from None
     finally:
         plt.close(figure)

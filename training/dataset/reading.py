@@ -13,8 +13,8 @@ from training.dataset.joy import read_joy
 from training.dataset.lengths import PRESETS, Lengths
 from training.dataset.primitive import Primitive
 from training.dataset.recordings import read_recording
-from training.dataset.segmentation import IDLE_S, as_thesis, at_buttons
-from training.dataset.store import DatasetError, open_set
+from training.dataset.segmentation import IDLE_S, THESIS_ROWS, as_thesis, at_buttons
+from training.dataset.store import DatasetError, Stored, open_set
 from training.dataset.table import read_table
 from training.dataset.track import Problem, Track
 from training.dataset.vectors import THESIS_RATE_HZ, Vector, read_vectors
@@ -67,10 +67,12 @@ class Reading:
     Attributes:
         primitives: what can be used.
         problems: rows and primitives that cannot, each with its reason.
+        made: the commands that the file says it came from; only sets do.
     """
 
     primitives: list[Primitive]
     problems: list[Problem]
+    made: str = ""
 
 
 def format_of(path: Path) -> Format:
@@ -116,8 +118,11 @@ def read_file(path: Path, rules: Rules, file_format: Format | None = None) -> Re
     if file_format is None:
         file_format = format_of(path)
     if file_format == "npz":
-        primitives, problems = _from_set(path, rules)
-    elif file_format == "vectors":
+        stored = open_set(path)
+        primitives, problems = _from_set(stored, rules)
+        reading = at_lengths(path, primitives, problems, rules.lengths)
+        return replace(reading, made=stored.provenance.get("made", ""))
+    if file_format == "vectors":
         vectors, problems = read_vectors(path, parse_axes(rules.axes or SAMPLE_AXES), rules.classes)
         primitives = [_from_vector(path, vector, rules) for vector in vectors]
     else:
@@ -156,8 +161,8 @@ def operator_of(path: Path, rules: Rules) -> str:
     return rules.operator or path.stem
 
 
-def _from_set(path: Path, rules: Rules) -> tuple[list[Primitive], list[Problem]]:
-    stored = open_set(path)
+def _from_set(stored: Stored, rules: Rules) -> tuple[list[Primitive], list[Problem]]:
+    path = stored.path
     primitives, problems = [], []
     for row in range(len(stored)):
         try:
@@ -191,9 +196,12 @@ def _from_vector(path: Path, vector: Vector, rules: Rules) -> Primitive:
 def _from_track(path: Path, track: Track, rules: Rules) -> tuple[list[Primitive], list[Problem]]:
     primitives, problems = [], []
     if rules.segmentation == "thesis":
-        segments = as_thesis(track)
+        segments, sought = as_thesis(track), f"run of {THESIS_ROWS} rows with vx and vy off 0"
     else:
-        segments = at_buttons(track, rules.idle_s)
+        segments, sought = at_buttons(track, rules.idle_s), "motion"
+    if not segments:
+        text = f"no {sought} in its {len(track.held)} samples: wrong --axes, or the wrong file?"
+        problems.append(Problem(str(path), "", text))
     for segment in segments:
         first_s = float(track.times_s[segment.begin] - track.times_s[0])
         last_s = float(track.times_s[segment.end - 1] - track.times_s[0])

@@ -57,7 +57,7 @@ def _take(
     try:
         sticks = axes.sticks([cells[name] for name in VALUES])
     except ValueError as error:
-        builder.reject(where, str(error))
+        builder.reject(where, f"{error}; the row is left out")
         return
     held = tuple(button for name, button in FACES.items() if cells[name])
     builder.add(where, cells[TIME], sticks, held)

@@ -25,7 +25,7 @@ class Vector:
 
     Attributes:
         row: its number in the file, from 1.
-        sticks: (N, 4), without the zeros it was padded with.
+        sticks: (N, 4), without the zeros it was padded with, before or after.
         label: the integer at its end, as a name.
     """
 
@@ -92,4 +92,4 @@ def _parse(cells: list[str], axes: Axes, classes: Sequence[str]) -> tuple[Array,
     moved = np.flatnonzero(array.any(axis=1))
     if not len(moved):
         raise ValueError("it holds no motion")
-    return array[: moved[-1] + 1], classes[int(cells[-1])]
+    return array[moved[0] : moved[-1] + 1], classes[int(cells[-1])]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from dataset_samples import circle, performed, primitive, write_csv, write_sticks, write_vectors
 
+from cli.dataset.shared import PROBLEMS_SHOWN
 from cli.main import main
 from training.dataset.store import load, open_set, save
 
@@ -44,6 +45,46 @@ def test_import_replaces_no_set_but_adds_to_one(
     assert open_set(out).provenance["made"] == (
         f"import {path} --out {out}; import {path} --out {out} --append --operator ben"
     )
+
+
+def test_a_set_of_sets_says_how_each_of_them_was_made(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "a.csv", performed((circle(), "circle")))
+    out, again = tmp_path / "set.npz", tmp_path / "again.npz"
+    assert dataset("import", path, "--out", out) == 0
+    assert dataset("import", out, "--out", again) == 0
+    made = open_set(again).provenance["made"]
+    assert made == f"import {path} --out {out}; import {out} --out {again}"
+
+
+def test_import_leaves_out_what_check_finds_fault_with(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = tmp_path / "a.npz", tmp_path / "sound.npz"
+    hung = primitive(sticks=np.full((150, 4), 0.4), source="hung.csv")
+    save(path, [primitive(), hung, primitive(source="twice.csv")])
+    assert dataset("import", path, "--out", out, "--sound") == 0
+    assert [p.source for p in load(out)] == ["test"]
+    told = capsys.readouterr().err
+    assert "hung.csv: arc by ana: every sample is the same: a pad that hangs?; left out\n" in told
+    assert "twice.csv: arc by ana: the same sticks as row 0; keep one; left out\n" in told
+    assert dataset("check", out) == 0
+    save(path, [hung])
+    assert dataset("import", path, "--out", tmp_path / "b.npz", "--sound") == 1
+    assert "nothing was written" in capsys.readouterr().err
+
+
+def test_a_file_gets_all_problems_and_a_terminal_the_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_csv(tmp_path / "a.csv", performed((circle(), "circle")))
+    path.write_text(path.read_text() + "spam\n" * 30)
+    assert dataset("import", path, "--out", tmp_path / "a.npz") == 0
+    assert capsys.readouterr().err.count("'spam' is no number") == 30
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    assert dataset("import", path, "--out", tmp_path / "b.npz") == 0
+    told = capsys.readouterr().err
+    assert told.count("'spam' is no number") == PROBLEMS_SHOWN
+    assert "... and 10 more; 2> problems.txt writes all of them there\n" in told
 
 
 def test_a_set_says_with_which_options_it_was_made(
@@ -106,6 +147,11 @@ def test_wrong_usage_exits_with_2_and_names_the_option(
     [
         (["--over", "drop"], "--over and --pad need a --length"),
         (["--ignored-is-none"], "--ignored-is-none goes with --from-flights"),
+        (["--from-flights", "--label", "arc"], "--label says nothing of --from-flights"),
+        (["--from-flights", "--idle", "2"], "--idle says nothing of --from-flights"),
+        (["--from-flights", "--format", "joy"], "--format says nothing of --from-flights"),
+        (["--from-flights", "--segmentation", "thesis"], "--segmentation says nothing of"),
+        (["--shortest", "400", "--longest", "45"], "--shortest 400 samples is more than --longest"),
     ],
 )
 def test_options_that_need_others_say_so(
@@ -137,14 +183,30 @@ def test_stats_count_and_draw(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert dataset("stats", path, "--figure", figure) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["arc", "1", "1", "150", "/", "150", "/", "150"] in [line[:8] for line in lines]
-    assert ["ben", "1", "0", "0", "1", "0", "0", "1", "150", "50"] in lines
+    assert ["ben", "1", "0", "0", "1", "0", "0", "150", "50"] in lines
     assert figure.read_bytes().startswith(b"\x89PNG")
-    save(path, [primitive(operator="wide0-pilot-yaw-nervous-0012")])
+    names = ["wide0-pilot-strafe-rough-0012", "[/ana]"]
+    save(path, [primitive(operator=name, family="[b]") for name in names])
     assert dataset("stats", path) == 0
-    assert "…" not in capsys.readouterr().out
+    words = capsys.readouterr().out.split()
+    assert {*names, "[b]"} <= set(words)
     save(path, [])
     assert dataset("stats", path) == 1
     assert dataset("stats", figure) == 1
+
+
+@pytest.mark.parametrize("name", ["lengths", "lengths.xyz", "."])
+def test_a_figure_of_no_known_kind_is_refused_before_anything_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    path = tmp_path / "a.npz"
+    save(path, [primitive()])
+    with pytest.raises(SystemExit) as exit_:
+        dataset("stats", path, "--figure", name)
+    assert exit_.value.code == 2
+    assert "name a file that ends in .png, .pdf, .svg" in capsys.readouterr().err
+    assert dataset("stats", path, "--figure", path / "a.png") == 1
+    assert "a.png cannot be written" in capsys.readouterr().err
 
 
 def test_split_deals_whole_operators(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -169,6 +231,19 @@ def test_generate_makes_the_same_set_for_the_same_seed(tmp_path: Path) -> None:
     assert dataset("check", tmp_path / "a.npz") == 0
     made = open_set(tmp_path / "a.npz").provenance["made"]
     assert made == "generate --preset wide --operators 3 --multiple 0.004 --none 3 --seed 7"
+
+
+def test_generate_replaces_no_set_and_counts_who_performs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "a.npz"
+    small = ("--operators", 3, "--multiple", 0.001)
+    assert dataset("generate", "--out", out, *small) == 0
+    assert capsys.readouterr().out == f"{out}: 4 primitives by 1 operators\n"
+    whole = out.read_bytes()
+    assert dataset("generate", "--out", out, *small, "--seed", 1) == 1
+    assert "is there already; choose another --out" in capsys.readouterr().err
+    assert out.read_bytes() == whole
 
 
 def test_people_of_other_seeds_have_other_names(tmp_path: Path) -> None:

@@ -47,11 +47,12 @@ def test_every_format_gives_the_sticks_with_the_label_of_the_button(
 
 
 def test_vectors_give_their_sticks_at_a_rate_without_their_padding(tmp_path: Path) -> None:
-    padded = np.concatenate([circle(), np.zeros((50, 4))])
-    path = write_vectors(tmp_path / "v.csv", [(circle(), 1), (padded, 3)])
+    after = np.concatenate([circle(), np.zeros((50, 4))])
+    before = np.concatenate([np.zeros((50, 4)), circle()])
+    path = write_vectors(tmp_path / "v.csv", [(circle(), 1), (after, 3), (before, 2)])
     assert format_of(path) == "vectors"
     reading = read_file(path, Rules(rate_hz=45.0))
-    assert [p.label for p in reading.primitives] == ["arc", "helix"]
+    assert [p.label for p in reading.primitives] == ["arc", "helix", "sine"]
     for found in reading.primitives:
         np.testing.assert_allclose(found.sticks, circle())
         assert found.rate_hz == pytest.approx(45.0)
@@ -280,11 +281,14 @@ def test_lengths_drop_pad_and_shorten_as_asked() -> None:
     assert replace(thesis, shortest=Limit(4.0, is_time=True)).apply(usual) != usual
 
 
-def test_rest_is_no_primitive(tmp_path: Path) -> None:
+def test_rest_is_no_primitive_and_told_of(tmp_path: Path) -> None:
     path = write_sticks(tmp_path / "a.mcap", [(REST, "")] * 200 + [(REST, "cross")] * 5)
     reading = read_file(path, Rules())
     assert not reading.primitives
-    assert not reading.problems
+    (problem,) = reading.problems
+    assert str(problem).startswith(f"{path}: no motion in its 205 samples: wrong --axes, or")
+    (problem,) = problems_of(path, Rules(segmentation="thesis"))
+    assert problem.startswith("no run of 90 rows with vx and vy off 0 in its 205 samples")
 
 
 @pytest.mark.parametrize("file_format", [*WRITERS, "vectors"])
