@@ -4,10 +4,22 @@ World frame ENU; lengths in m, angles in the files in degrees (for people), in m
 """
 
 from worlds.files import WorldError, load, load_file, names
-from worlds.model import Body, Primitive, Segment, Shape, Strip, Texture, World
+from worlds.model import (
+    MAX_COORDINATE_M,
+    MAX_HEIGHT_M,
+    Body,
+    Primitive,
+    Segment,
+    Shape,
+    Strip,
+    Texture,
+    World,
+)
 from worlds.path import PATH_STEP_M
 
 __all__ = [
+    "MAX_COORDINATE_M",
+    "MAX_HEIGHT_M",
     "PATH_STEP_M",
     "Body",
     "Primitive",

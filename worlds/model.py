@@ -1,5 +1,6 @@
 """What a world is made of. Lengths in m, angles in rad, world frame ENU."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -28,6 +29,11 @@ Primitive = Literal["line", "arc", "sine", "helix"]
 Vector3 = tuple[float, float, float]
 Colour = tuple[float, float, float]
 
+MAX_COORDINATE_M = 1000.0
+"""A vehicle is set down no farther to the east, north, west or south of the world's middle."""
+MAX_HEIGHT_M = 100.0
+"""Nor higher above its ground."""
+
 
 @dataclass(frozen=True)
 class Segment:
@@ -50,6 +56,14 @@ class Segment:
     climb_m: float = 0.0
     amplitude_m: float | None = None
     wavelength_m: float | None = None
+
+    @property
+    def bend_m(self) -> float:
+        """The radius of its sharpest bend, seen from above."""
+        if self.amplitude_m is not None and self.wavelength_m is not None:
+            # Of A sin(k x) at its crests.
+            return 1.0 / (self.amplitude_m * (2.0 * math.pi / self.wavelength_m) ** 2)
+        return math.inf if self.radius_m is None else self.radius_m
 
 
 @dataclass(frozen=True)

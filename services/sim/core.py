@@ -17,12 +17,10 @@ from services.sim.config import Config
 from services.sim.crew import crew_of
 from services.sim.hull import Hull
 from services.sim.stage import Scene, Stage
-from worlds import World
+from worlds import MAX_COORDINATE_M, MAX_HEIGHT_M, World
 
 __all__ = ["PHYSICS_HZ", "STEP_NS", "STEP_S", "ResetError", "Simulation", "Step"]
 
-MAX_COORDINATE_M = 1000.0
-MAX_HEIGHT_M = 100.0
 APART_M = 1.0
 """Between the vehicles' start places."""
 _ROOM_M = 0.2
@@ -241,7 +239,11 @@ def _start_place(world: World, hull: Hull, actor: Actor) -> tuple[Vector3, float
     if actor.index == 0:
         hull.place((x, y, z), yaw_rad)
         if hull.overlaps():
-            raise ResetError("world", f"{world.name}: something stands where it starts: `start`")
+            raise ResetError(
+                "world",
+                f"{world.name}: something stands where it starts;"
+                " move that, or its `start`, or ask for another position",
+            )
         return (x, y, z), yaw_rad
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     for row in range(_ROWS):

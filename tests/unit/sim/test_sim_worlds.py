@@ -224,6 +224,35 @@ def test_sampling_follows_an_arc_of_either_hand(tmp_path: Path) -> None:
             "`bodies` are 1000000; 5000 at most",
         ),
         ("description: a\nstart: {yaw_deg: .nan}", "yaw_deg"),
+        ("", "use description, ground, start"),
+        ("description: a\nbodies: []\nground: grass\nbodies: []", "`bodies` is there twice"),
+        ("description: a\nstart: {position_m: [0, 0, -1]}", "`$.start.position_m[2]`"),
+        ("description: a\nstart: {position_m: [1001, 0, 0]}", "`$.start.position_m[0]`"),
+        (
+            "description: a\nideal_path: {start_m: [0, 0, 1], segments:"
+            " [{primitive: helix, radius_m: 2, sweep_deg: 360, climb_m: -3}]}",
+            "`ideal_path` goes down to -2 m",
+        ),
+        (
+            "description: a\nideal_path: {start_m: [0, 0, 1], segments:"
+            " [{primitive: arc, radius_m: 1000, sweep_deg: 3600}]}",
+            "`ideal_path` is 62832 m long; 10000 m at most",
+        ),
+        (
+            "description: a\nideal_path: {start_m: [0, 0, 1], segments:"
+            " [{primitive: sine, length_m: 1, amplitude_m: 9, wavelength_m: 1.0e-6}]}",
+            "wavelength_m",
+        ),
+        (
+            "description: a\nlane: {width_m: 4}\nideal_path: {start_m: [0, 0, 1], segments:"
+            " [{primitive: line, length_m: 9}, {primitive: arc, radius_m: 2, sweep_deg: 90}]}",
+            "`lane.width_m` is 4, but a bend of the path has a radius of 2 m",
+        ),
+        (
+            "description: a\nlane: {width_m: 4}\nideal_path: {start_m: [0, 0, 1], segments:"
+            " [{primitive: sine, length_m: 12, amplitude_m: 2, wavelength_m: 6}]}",
+            "`lane.width_m` is 4, but a bend of the path has a radius of 0.456 m",
+        ),
     ],
 )
 def test_a_wrong_file_is_refused_with_its_name_and_the_field(
@@ -244,10 +273,12 @@ def test_a_world_whose_start_is_taken_is_refused(tmp_path: Path) -> None:
         "description: a crate where it starts\n"
         "bodies: [{shape: box, size_m: [1, 1, 1], position_m: [0, 0, 0.2], texture: crate}]\n"
     )
-    with pytest.raises(ResetError, match=r"full\.yaml: something stands.*`start`"):
+    with pytest.raises(
+        ResetError, match=r"full\.yaml: something stands.*; move that, or its `start`"
+    ):
         Simulation(Config(world=str(file)))
     # No network is needed to say so.
-    with pytest.raises(ValueError, match=r"^world: .*full\.yaml: something stands.*`start`$"):
+    with pytest.raises(ValueError, match=r"^world: .*full\.yaml: something stands.*`start`"):
         check(Config(world=str(file)), "unit")
     # Who is told another place may go there.
     config = Config(world="empty")
