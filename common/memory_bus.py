@@ -1,4 +1,4 @@
-"""A bus inside one process: lock-step runs and tests, with the behaviour of the Zenoh bus."""
+"""A bus inside one process, for tests; one suite holds it and the Zenoh bus to the same."""
 
 import threading
 from collections.abc import Callable

@@ -347,9 +347,10 @@ def decode(data: bytes, message: type[P]) -> P:
     if decoder is None:
         decoder = _decoders[message] = msgspec.msgpack.Decoder(message)
     try:
-        return decoder.decode(data)  # type: ignore[no-any-return]
+        payload: P = decoder.decode(data)
     except (msgspec.DecodeError, RecursionError, OverflowError, UnicodeDecodeError) as error:
         raise InvalidPayloadError(str(error)) from None
+    return payload
 
 
 def encoding_of(message: type[Payload]) -> str:

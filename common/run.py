@@ -25,8 +25,8 @@ _logger = logging.getLogger(__name__)
 
 def config_type_of(service: str) -> type[Any]:
     """The dataclass that configures a service: `Config` of its config module."""
-    module = importlib.import_module(f"services.{service}.config")
-    return module.Config  # type: ignore[no-any-return]
+    config_type: type[Any] = importlib.import_module(f"services.{service}.config").Config
+    return config_type
 
 
 def stop_on_signals() -> threading.Event:

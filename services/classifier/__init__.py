@@ -1,0 +1,1 @@
+"""Which primitive the sticks have begun, or none."""

@@ -1,0 +1,1 @@
+"""Where the vehicle is: inertial navigation, corrected by compass, altimeter and flow."""

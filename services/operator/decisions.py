@@ -13,6 +13,8 @@ from common.node import Node, RefusedError
 TIMEOUT_S = 1.0
 TRIES = 2
 """The same nonce again has no second effect, so a lost answer may be asked for again."""
+ANSWERS = 16
+"""Kept for who wants to know; a person at a pad sees in the console what became of a button."""
 
 log = logging.getLogger(__name__)
 
@@ -34,7 +36,7 @@ class Decisions:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._answers: deque[Answer] = deque()
+        self._answers: deque[Answer] = deque(maxlen=ANSWERS)
 
     def put(self, action: m.DecideAction, suggestion: int | None = None) -> None:
         """Ask; returns at once."""

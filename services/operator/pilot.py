@@ -8,6 +8,7 @@ and takes over by the sticks when a primitive ends or the course is about to lea
 import math
 from collections import deque
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -463,5 +464,6 @@ class Pilot:
         else:
             self._wanted = None
 
-    def _note(self, **changes: object) -> None:
-        self.progress = replace(self.progress, **changes)  # type: ignore[arg-type]
+    def _note(self, **changes: Any) -> None:
+        """Change fields of the progress, each of its own type."""
+        self.progress = replace(self.progress, **changes)

@@ -14,7 +14,8 @@ from services.operator.pilot import Pilot
 from services.operator.route import Route, route_of
 from services.operator.sources import Output, Reading, Sources
 
-STICK_RATE_HZ = TOPICS["stick"].rate_hz or 50.0
+STICK_RATE_HZ = TOPICS["stick"].rate_hz
+assert STICK_RATE_HZ is not None
 PERIOD_S = 1.0 / STICK_RATE_HZ
 
 WAITING = 8
@@ -66,8 +67,6 @@ def wire(node: Node, config: Config) -> None:
         )
         for action in last.decisions:
             decisions.put(action)
-        if not isinstance(device, _Scripted):
-            decisions.take()
 
     def health() -> HealthReport:
         state, detail = device.health()

@@ -1,0 +1,1 @@
+"""Writes what flies into an MCAP file."""

@@ -80,7 +80,7 @@ class Recording:
             OSError: if the stream does not take them.
         """
         try:
-            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._writer.finish()
         finally:
             self._stream.close()
 

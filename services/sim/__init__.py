@@ -1,0 +1,1 @@
+"""The vehicles, their world, their instruments and cameras."""

@@ -1,0 +1,1 @@
+"""From what the operator means to a path that continues it."""
