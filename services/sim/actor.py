@@ -239,8 +239,9 @@ class Actor:
 
     def _look_down(self) -> float:
         """What the altimeter would measure; notes what is right below."""
+        state = self.state
         ranges_m = self._stage.ranges(
-            self.state.position_m, sensors.cone(self.state), sensors.RANGE_MAX_M
+            self.hull, state.position_m, sensors.cone(state), sensors.RANGE_MAX_M
         )
         self._below_m = ranges_m[0]
         return min(ranges_m)

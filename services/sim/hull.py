@@ -21,6 +21,8 @@ RESTITUTION = 0.1
 _TIPPED_COS = math.cos(1.0)
 _CARRIED_COS = math.cos(0.8)
 """A push that leans less from upright than this carries the vehicle, another bars its way."""
+_ALL = -1
+"""The mask of what touches everything."""
 _MARGIN_M = 0.05
 """Nearer than this to the hull's sphere, contacts are looked for at each step."""
 
@@ -50,6 +52,7 @@ class Hull:
         client: the number of the pybullet it is put into.
         build: of the vehicle.
         step_s: of physics.
+        group: a bit of its own, by which rays pass it over.
         ground: the number of the ground.
         fixed: the numbers of all that stands there.
         away_m: how far a place is at least from all that stands there.
@@ -60,6 +63,7 @@ class Hull:
         client: int,
         build: Build,
         step_s: float,
+        group: int,
         ground: int,
         fixed: tuple[int, ...],
         away_m: Callable[[Vector3], float],
@@ -67,6 +71,7 @@ class Hull:
         self._id = client
         self._on = on = {"physicsClientId": client}
         self._step_s = step_s
+        self.group = group
         self._ground, self._fixed = ground, fixed
         self._away_m = away_m
         self._rest_height_m = build.rest_height_m
@@ -77,6 +82,7 @@ class Hull:
         """Where it was last seen."""
         shape = collision_shape(build.hull, **on)
         self._body = pybullet.createMultiBody(build.mass_kg, shape, **on)
+        pybullet.setCollisionFilterGroupMask(self._body, -1, group, _ALL, **on)
         # pybullet's own damping of 0.04 would take 7.5 % of the speed every second.
         pybullet.changeDynamics(
             self._body,

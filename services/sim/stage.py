@@ -1,5 +1,6 @@
 """A world in pybullet, and the vehicles' bodies in it."""
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,8 @@ from services.sim.scenery import MOST, add_bodies
 from worlds import Body, Shape, Strip, Texture, World
 
 _FRICTION = 0.8
+_FIRST_BIT = 6
+"""Of vehicles' groups; Bullet uses those below."""
 _SHAPES: dict[int, Shape] = {kind: shape for shape, kind in KINDS.items()}
 
 
@@ -67,7 +70,10 @@ class Stage:
 
     def add(self, build: Build) -> Hull:
         """Put in another vehicle; it has to be placed."""
-        hull = Hull(self._id, build, self._step_s, self._ground, tuple(self._scenery), self._away_m)
+        taken = {hull.group for hull in self._hulls}
+        group = next(1 << bit for bit in itertools.count(_FIRST_BIT) if 1 << bit not in taken)
+        fixed = tuple(self._scenery)
+        hull = Hull(self._id, build, self._step_s, group, self._ground, fixed, self._away_m)
         self._hulls.append(hull)
         self._acquaint()
         return hull
@@ -96,14 +102,18 @@ class Stage:
             nearest_m = min(nearest_m, float(away.min()))
         return nearest_m
 
-    def ranges(self, position_m: Vector3, rays: list[Vector3], reach_m: float) -> list[float]:
+    def ranges(
+        self, hull: Hull, position_m: Vector3, rays: list[Vector3], reach_m: float
+    ) -> list[float]:
         """How far it is from a place along unit vectors (world) to what is there, or `reach_m`.
 
-        Begun inside the hull, a ray does not see it.
+        The hull, which is a vehicle's own, is not seen.
         """
         x, y, z = position_m
         ends = [(x + dx * reach_m, y + dy * reach_m, z + dz * reach_m) for dx, dy, dz in rays]
-        hits = pybullet.rayTestBatch([position_m] * len(ends), ends, **self._on)
+        hits = pybullet.rayTestBatch(
+            [position_m] * len(ends), ends, collisionFilterMask=~hull.group, **self._on
+        )
         return [reach_m if hit[0] < 0 else hit[2] * reach_m for hit in hits]
 
     def scene(self) -> Scene:

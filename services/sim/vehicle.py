@@ -16,6 +16,10 @@ WATCHDOG_S = TOPICS["command"].max_age_s
 TAKE_OFF_HEIGHT_M = 0.5
 """Here a take-off is over (tum_simulator a020d89). It stops its rotors 0.2 m up or after 5 s of
 landing; here they stop on touching down, since a real drone is not dropped."""
+LANDED_HEIGHT_M = 0.2
+"""What it touches while it lands, and is nearer than this below it, carries it."""
+_OFF_ITS_FEET_M, _ON_ITS_FEET_M = 0.4, 0.1
+"""Both heights are those of the body's origin; a tall vehicle's are so far above where it rests."""
 
 CAPSIZED_COS = math.cos(1.4)
 """Tilted beyond 1.4 rad the rotors stop, as the real drone's do."""
@@ -104,6 +108,9 @@ class Vehicle:
         self._ceiling_m = ceiling_m
         self._weight_n = plant.build.mass_kg * GRAVITY_MPS2
         self._drain = step_s / plant.life_s
+        rest_m = plant.build.rest_height_m
+        self._up_m = max(TAKE_OFF_HEIGHT_M, rest_m + _OFF_ITS_FEET_M)
+        self._down_m = max(LANDED_HEIGHT_M, rest_m + _ON_ITS_FEET_M)
         self._sticks = _NEUTRAL
         self._silence_s = 0.0
         self._apart_s = COLLISION_GAP_S
@@ -195,11 +202,11 @@ class Vehicle:
         if state.rotation[8] < CAPSIZED_COS or self.battery == 0.0:
             self.state = "emergency"
         elif now == "landing":
-            if (touch.ground or touch.body) and below_m < 0.2:
+            if (touch.ground or touch.body) and below_m < self._down_m:
                 self.state = "landed"
         elif self.battery < BATTERY_LOW:
             self.state = "landing"
-        elif now == "taking_off" and below_m >= TAKE_OFF_HEIGHT_M:
+        elif now == "taking_off" and below_m >= self._up_m:
             self.state = "flying"
 
     def _count_collisions(self, touch: Touch) -> None:

@@ -11,7 +11,7 @@ from msgspec import structs
 
 import worlds
 from common.frames import quaternion_of
-from common.messages import ResetRequest
+from common.messages import Range, ResetRequest
 from services.autopilot.config import Config as AutopilotConfig
 from services.autopilot.core import Autopilot
 from services.autopilot.plants import plant_of
@@ -56,6 +56,31 @@ def test_it_stands_beside_others_and_comes_by_a_reset(heavy: str) -> None:
     simulation = Simulation(Config(world="empty", vehicles=f"tum,{heavy}"))
     assert [actor.plant_name for actor in simulation.actors] == ["tum", heavy]
     assert simulation.reset(ResetRequest(plant=heavy, position=(3.0, 0.0, 0.0))).plant == heavy
+    simulation.close()
+
+
+def test_one_on_long_legs_takes_off_and_lands_and_does_not_measure_to_its_legs(
+    heavy: str, tmp_path: Path
+) -> None:
+    code = (tmp_path / f"{heavy}.py").read_text()
+    leg = 'Body("box", (0.1, 0.1, 0.3), (0.0, 0.0, -0.55), UPRIGHT, "metal")'
+    (tmp_path / "tall.py").write_text(code.replace("hull=(RING,)", f"hull=(RING, {leg})"))
+    simulation = Simulation(
+        Config(world="empty", plant="tall", sensor_noise=0.0, command_noise=0.0, renderer="none")
+    )
+    assert simulation.state.position_m[2] == pytest.approx(0.7)
+    fly(simulation, 0.1, action="takeoff")
+    assert simulation.status().state == "taking_off"
+    _, messages = fly(simulation, 2.0)
+    assert simulation.status().state == "flying"
+    height_m = simulation.state.position_m[2]
+    assert height_m > 1.0
+    assert [m.range for _, m in messages if isinstance(m, Range)][-1] == pytest.approx(
+        height_m, abs=0.02
+    )
+    fly(simulation, 6.0, action="land")
+    assert simulation.status().state == "landed"
+    assert simulation.status().collisions == 0
     simulation.close()
 
 
