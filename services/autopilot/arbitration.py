@@ -34,7 +34,7 @@ class Event(StrEnum):
     VEHICLE_EMERGENCY = "vehicle_emergency"
     """It cut its motors."""
     VEHICLE_CHANGED = "vehicle_changed"
-    """It is of another plant now: it was reset."""
+    """It is of another plant now, or says otherwise how it follows its stick: it was reset."""
     BATTERY_EMPTY = "battery_empty"
     TAKEOFF_FAILED = "takeoff_failed"
     """It did not obey in time."""

@@ -41,6 +41,9 @@ STANDSTILL_S = 1.0
 DEFAULT_PLANT: m.Plant = "tum"
 """Until the vehicle says what it is."""
 
+_Description = tuple[m.Plant, m.FullStickSpeeds | None, m.FollowingRates | None]
+"""What a vehicle says of how it follows its stick."""
+
 Follow = Callable[[m.Suggestion, m.Pose, Controller, Config], PathFollower]
 """Makes what flies an accepted suggestion; raises BadPathError if it cannot be flown from here."""
 
@@ -79,6 +82,7 @@ class Autopilot:
         self._link = StickLink(config.stick_loss_s, config.dead_band, config.stuck_s)
         self._guard = Guard(config.slew_ps)
         self._controller = Controller(DEFAULT_PLANT, config)
+        self._described: _Description = (DEFAULT_PLANT, None, None)
         self._is_known = True
         """Whether there is a model of the vehicle; else it is steered by hand alone."""
         self._pose: m.Pose | None = None
@@ -142,7 +146,9 @@ class Autopilot:
     def on_vehicle(self, vehicle: m.VehicleStatus, now_ns: int) -> None:
         """Take the vehicle's own state in."""
         self._vehicle, self._vehicle_ns = vehicle, now_ns
-        if vehicle.plant != self._controller.plant_name:
+        described = (vehicle.plant, vehicle.full_stick, vehicle.rates)
+        if described != self._described:
+            self._described = described
             model = plant_of(vehicle)
             self._is_known = model is not None
             self._controller = Controller(

@@ -1,5 +1,6 @@
 """The autopilot's rules one by one, in scenes that a person could fly."""
 
+import msgspec
 import pytest
 from autopilot_worlds import LaggingVehicle, Rig, circle, line, pose, suggestion, vehicle
 
@@ -506,6 +507,16 @@ def test_another_plant_ends_the_path(rig):
     rig.autopilot.on_vehicle(vehicle("flying", plant="ardrone"), rig.now_ns)
     rig.run(0.02)
     assert (rig.command.mode, rig.status.reason) == ("hover", "vehicle_changed")
+
+
+def test_a_plant_that_follows_its_stick_otherwise_than_before_has_another_model(rig):
+    described = {"full_stick": (1.0, 1.0, 0.5, 0.5, 1.0), "rates": (2.0, 2.0, 2.0)}
+    for rates in ((2.0, 2.0, 2.0), (1.0, 1.0, 1.0)):
+        told = msgspec.structs.replace(
+            vehicle("flying", plant="mine"), **described | {"rates": rates}
+        )
+        rig.autopilot.on_vehicle(told, rig.now_ns)
+        assert rig.autopilot._controller.plant.plane.rate_ps == rates[0]
 
 
 def test_another_plant_is_held_by_its_own_model(rig):
