@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Sequence
+from inspect import cleandoc
 from typing import Any
 
 from msgspec import inspect
@@ -135,7 +136,7 @@ def _definition(payload: type[m.Payload]) -> str:
         for field in info.fields
         if field.encode_name not in _HEAD
     ]
-    text = (payload.__doc__ or "").strip()
+    text = cleandoc(payload.__doc__ or "")
     parts = [f"### {payload.__name__}\n", f"{text}\n"]
     if rows:
         parts.append(_table(("field", "type", "range"), rows) + "\n")
@@ -157,7 +158,7 @@ def _plain_type(info: inspect.Type) -> tuple[str, str]:
         case inspect.IntType() | inspect.FloatType():
             return "int" if isinstance(info, inspect.IntType) else "float", _interval(info)
         case inspect.StrType(min_length=low, max_length=high):
-            return "str", "" if high is None else f"{low} to {high} characters"
+            return "str", "" if high is None else f"{low or 0} to {high} characters"
         case inspect.BoolType():
             return "bool", ""
         case inspect.BytesType():

@@ -141,8 +141,16 @@ class Intent(Message, frozen=True, kw_only=True):
 class Suggestion(Message, frozen=True, kw_only=True):
     """A path that continues the operator's motion, starting at the vehicle.
 
-    The same `id` again is the same meaning with a newer path. `params_std` holds standard errors of
-    `params` by their names, `note` why the path is simpler, shorter or slower than what was asked.
+    The same `id` again is the same meaning with a newer path. The end of a `closed` path joins its
+    start: it may be flown again and again. `speed` is in m/s, `fit_rms` in m. `heading_sector` is
+    the direction of travel in sectors of 45 degrees, 0 along the body's x, counter-clockwise.
+
+    `params` describe the shape in the world frame. `line`: a point `x y z`, `heading` (of travel)
+    and `climb` in rad. `arc`: centre `cx cy`, `z`, `radius`, `sweep` (rad in all, +
+    counter-clockwise). `helix`: as an arc, and `pitch` (m a turn, + up). `sine`: the point `x y z`
+    of its axis beside the vehicle, `heading`, `amplitude`, `wavelength`, `phase` there.
+    `params_std` holds standard errors by their names, `note` why the path is simpler, shorter or
+    slower than what was asked.
     """
 
     id: Annotated[int, Meta(gt=0)]
@@ -166,7 +174,10 @@ class Refusal(Message, frozen=True, kw_only=True):
 
 
 class AutopilotStatus(Message, frozen=True, kw_only=True):
-    """Who flies, along which suggestion (0: none), and why the mode last changed."""
+    """Who flies, along which suggestion (0: none), and why the mode last changed.
+
+    `progress` is how far along the path, `cross_track` how far beside it, in m.
+    """
 
     mode: FlightMode
     suggestion: Count
@@ -221,7 +232,10 @@ class Range(Message, frozen=True, kw_only=True):
 
 
 class Image(Message, frozen=True, kw_only=True):
-    """A picture with its lens. `capture` is when it was taken, carried through later stages."""
+    """A picture with its lens. `capture` is when it was taken, carried through later stages.
+
+    `intrinsics` are fx fy cx cy in pixels, `distortion` k1 k2 p1 p2.
+    """
 
     width: Annotated[int, Meta(gt=0, le=8192)]
     height: Annotated[int, Meta(gt=0, le=8192)]
@@ -249,7 +263,11 @@ class VehicleStatus(Message, frozen=True, kw_only=True):
 
 
 class Health(Message, frozen=True, kw_only=True):
-    """How a service is doing, once a second."""
+    """How a service is doing, once a second.
+
+    By topic, `rates` are what it hears in Hz, `rejected` how many payloads were invalid.
+    `latency_p50` and `latency_p99` are of its own main step, in s.
+    """
 
     service: Name
     version: str
@@ -262,7 +280,11 @@ class Health(Message, frozen=True, kw_only=True):
 
 
 class DecideRequest(Payload, frozen=True, kw_only=True):
-    """What the operator decides; the same nonce again has no second effect."""
+    """What the operator decides; the same nonce again has no second effect.
+
+    `accept` takes the `suggestion` of that id, or the newest if none is named; one that is unknown
+    or stale is refused.
+    """
 
     action: DecideAction
     nonce: int
