@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.markup import escape
 
 from cli import options as opts
 from cli.dataset import shared
@@ -62,11 +63,11 @@ class _Set:
     """The file that grows.
 
     Raises:
-        OSError: if it is there and is no set.
+        OSError: if it is there and is no set, or there is no place for it.
     """
 
     def __init__(self, options: argparse.Namespace) -> None:
-        from training.dataset.store import open_set
+        from training.dataset.store import open_set, require_place
 
         self.path = options.out or Path("recordings") / f"{options.operator}.npz"
         self.taken = 0
@@ -77,6 +78,8 @@ class _Set:
             stored = open_set(self.path)
             self._primitives, before = stored.primitives(), stored.provenance
         self._provenance = shared.made(before, options)
+        # Before anybody performs for nothing.
+        require_place(self.path)
 
     def take(self, event: "Event") -> str:
         """Do what a press of the button asks for; what to tell the person."""
@@ -88,14 +91,12 @@ class _Set:
             self._primitives.append(event.primitive)
             self.taken += 1
             text = f"{self._label} of {event.primitive.duration_s:.1f} s"
-            faults = "; ".join(finding.text for finding in check([event.primitive]))
+            faults = escape("; ".join(finding.text for finding in check([event.primitive])))
             text += f", [yellow]{faults}[/]" if faults else ""
-        elif self.taken:
+        else:
             self._primitives.pop()
             self.taken -= 1
             text = "[yellow]the last one is taken back[/]"
-        else:
-            return "[yellow]no motion before the button[/]"
         self._save()
         return f"{text}    {self.counts()}"
 

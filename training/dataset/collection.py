@@ -1,7 +1,7 @@
 """Collects primitives one by one while somebody performs them. Pure.
 
 A face button, or the console's end mark, ends a primitive. Pressed again before the sticks move, it
-takes the last one back.
+takes the one back that it took; pressed once more, or after a refusal, it takes nothing.
 """
 
 from dataclasses import dataclass
@@ -65,6 +65,7 @@ class Collection:
         self._sticks: list[m.Stick] = []
         self._pressed_ns: int | None = None
         self._is_held = False
+        self._took = False
 
     def add(self, stick: m.Stick) -> Event | None:
         """Take a stick; what the button did, if it went down."""
@@ -79,6 +80,7 @@ class Collection:
                 return None
         self._pressed_ns = stick.stamp
         event = self._end()
+        self._took = event.verdict == "taken"
         # The press itself stays: the sticks' way back to rest is no motion (see segmentation).
         self._sticks = [stick]
         return event
@@ -96,7 +98,9 @@ class Collection:
         tracks = builder.tracks()
         segments = at_buttons(tracks[-1]) if tracks else []
         if not segments:
-            return Event("taken back")
+            if self._took:
+                return Event("taken back")
+            return Event("refused", reason="no motion before the button")
         track, segment = tracks[-1], segments[-1]
         times_s = track.times_s[segment.begin : segment.end]
         primitive = self._lengths.apply(

@@ -11,7 +11,10 @@ Arrays of schema 1, for n primitives of N samples together:
     provenance    () text: a JSON map of who made the file from what
 """
 
+import contextlib
+import errno
 import json
+import os
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -112,15 +115,34 @@ def save(
     for word in WORDS:
         arrays[word] = np.array([getattr(p, word) for p in primitives], dtype=np.str_)
     partial = path.with_name(f".{path.name}.partial")
+    require_place(path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         with partial.open("wb") as stream:
             np.savez_compressed(stream, **arrays)
         partial.replace(path)
     except OSError as error:
-        partial.unlink(missing_ok=True)
-        reason = error.strerror or str(error)
-        raise OSError(f"{path} cannot be written: {reason}; choose another --out") from None
+        with contextlib.suppress(OSError):
+            partial.unlink()
+        raise _unwritable(path, error) from None
+
+
+def require_place(path: Path) -> None:
+    """Make the folder of a data set to be written.
+
+    Raises:
+        OSError: if nothing can be written there.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not os.access(path.parent, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as error:
+        raise _unwritable(path, error) from None
+
+
+def _unwritable(path: Path, error: OSError) -> OSError:
+    reason = error.strerror or str(error)
+    return OSError(f"{path} cannot be written: {reason}; choose another --out")
 
 
 def load(path: Path) -> list[Primitive]:

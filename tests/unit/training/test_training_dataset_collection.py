@@ -28,6 +28,18 @@ def test_a_second_press_without_motion_takes_the_last_one_back() -> None:
     assert [event.verdict for event in events_of(rows)] == ["taken", "taken back"]
 
 
+def test_a_press_without_motion_takes_nothing_but_what_the_press_before_it_took() -> None:
+    again = [*[(REST, "end")] * 5, *[(REST, "")] * 20]
+    rows = [*performed((circle(), "end"), (circle(), "end")), *again, *again]
+    events = events_of([*again, *rows])
+    assert [event.verdict for event in events] == [
+        *("refused", "taken", "taken", "taken back", "refused")
+    ]
+    assert "no motion before the button" in events[-1].reason
+    events = events_of([*performed((circle(), "end"), (circle(30), "end")), *again])
+    assert [event.verdict for event in events] == ["taken", "refused", "refused"]
+
+
 def test_a_bouncing_button_is_pressed_once() -> None:
     rows = [*performed((circle(), "end"))]
     rows = [*rows[:-10], (REST, ""), (REST, "end"), (REST, ""), (REST, "end"), (REST, "")]
