@@ -24,10 +24,10 @@ REST_MPS = 0.1
 REST_S = 1.0
 """A vehicle that makes less way than this speed would for this time has ended its motion."""
 HELD_S, HELD_LEAST_S = 6.0, 1.5
-HELD_M, HELD_MPS = 0.8, 0.4
+HELD_M, HELD_MPS = 1.0, 0.4
 """A vehicle that stayed within this of its mean place and of where it was for `HELD_S`, or as long
 as is known but at least the second time, and made no more way than at this speed, was held."""
-HELD_FACTOR, HELD_MORE_M = 2.0, 0.1
+HELD_FACTOR, HELD_MORE_M = 2.5, 0.1
 """Corrections take it no farther than this many times as far as it strayed before, and a little."""
 GAP_S = 0.5
 JUMP_M = 1.0

@@ -2,7 +2,7 @@
 
 from services.classifier.config import SHIPPED_MODEL
 from services.classifier.model import OnnxModel
-from training.evaluation.hover import HOLD_S, bothered
+from training.evaluation.hover import HOLD_S, LEAD_S, bothered
 from training.generator.dataset import holds
 
 PEOPLE = 30
@@ -12,6 +12,6 @@ MOST_BOTHERED = 2
 
 
 def test_a_minute_of_hover_corrections_brings_hardly_anybody_a_suggestion() -> None:
-    held = bothered(OnnxModel(SHIPPED_MODEL), holds(PEOPLE, HOLD_S, seed=1000), 1.0)
+    held = bothered(OnnxModel(SHIPPED_MODEL), holds(PEOPLE, LEAD_S + HOLD_S, seed=1000), 1.0)
     assert held.asked > 55 * PEOPLE
     assert held.bothered <= MOST_BOTHERED, held

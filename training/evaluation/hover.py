@@ -25,6 +25,9 @@ from training.generator.noise import STEP_S
 Array = NDArray[np.float64]
 
 HOLD_S = 60.0
+LEAD_S = 5.0
+"""Before these a place is held, unasked: a vehicle is known of since it took off, and nobody is
+handed one in the middle of a correction."""
 HEIGHT_M = 1.5
 """Of the place that is held; high enough that no suggestion is refused for the ground."""
 COVARIANCE = (1e-4,) * 6
@@ -55,11 +58,12 @@ class Bothered:
 
 
 def bothered(model: Model, holds: Sequence[tuple[Primitive, Array]], period_s: float) -> Bothered:
-    """Let people hold a place, asked every `period_s`.
+    """Let people hold a place, asked every `period_s` after the first `LEAD_S`.
 
     Args:
         model: of the classifier.
-        holds: of each person the sticks, and x y z in m and yaw in rad (N, 4) every `STEP_S`.
+        holds: of each person the sticks, and x y z in m and yaw in rad (N, 4) every `STEP_S`, for
+            `LEAD_S` and as long as they are asked.
         period_s: T.
     """
     asked, intents, suggestions, different, people = 0, 0, 0, 0, 0
@@ -69,7 +73,7 @@ def bothered(model: Model, holds: Sequence[tuple[Primitive, Array]], period_s: f
         classifier = Classifier(ClassifierConfig(), model)
         synthesizer = Synthesizer(SynthesisConfig())
         poses = _poses(places)
-        flown, due_ns = 0, period_ns
+        flown, due_ns = 0, nanoseconds(LEAD_S) + period_ns
         given: list[tuple[int, int]] = []
         for seq, (time_s, stick) in enumerate(
             zip(hold.times_s.tolist(), hold.sticks.tolist(), strict=True)

@@ -12,7 +12,7 @@ from training.dataset.primitive import Primitive
 from training.evaluation.contender import Contender
 from training.evaluation.distortions import DISTORTIONS, distorted
 from training.evaluation.folds import Fold
-from training.evaluation.hover import HOLD_S, bothered
+from training.evaluation.hover import HOLD_S, LEAD_S, bothered
 from training.evaluation.measures import tally
 from training.evaluation.names import CALIBRATED, KNOWN, MOMENTS, WHOLE
 from training.evaluation.ours import Ours
@@ -87,7 +87,7 @@ def hovered(model_path: Path, seed: int, people: int) -> dict[str, Any]:
     """What people who only hold a place are bothered with, by period T in s."""
     model = OnnxModel(model_path)
     hold_seed = int(np.random.SeedSequence((seed, 9)).generate_state(1)[0])
-    held = holds(people, HOLD_S, hold_seed)
+    held = holds(people, LEAD_S + HOLD_S, hold_seed)
     return {str(period_s): vars(bothered(model, held, period_s)) for period_s in PERIODS_S}
 
 

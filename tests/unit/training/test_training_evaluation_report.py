@@ -14,7 +14,7 @@ from training.evaluation.bars import at_least, at_most, bars
 from training.evaluation.contenders import CONTENDERS, contender
 from training.evaluation.distortions import DISTORTIONS
 from training.evaluation.folds import SEEDS, Size, fold
-from training.evaluation.hover import Bothered, bothered, shown
+from training.evaluation.hover import LEAD_S, Bothered, bothered, shown
 from training.evaluation.latency import latency
 from training.evaluation.measures import Tally
 from training.evaluation.names import CALIBRATED, EVERYTHING, FAMILY, KNOWN, LITE, MOMENTS, OURS
@@ -99,7 +99,7 @@ class Stub:
 
 def pushing(seconds: float, *, moves: bool) -> tuple[Primitive, np.ndarray]:
     """Sticks forward, and where the vehicle is: on its way, or held by something."""
-    times_s = np.arange(round(seconds * 50)) / 50.0
+    times_s = np.arange(round((LEAD_S + seconds) * 50)) / 50.0
     sticks = np.tile([0.4, 0.0, 0.0, 0.0], (len(times_s), 1))
     places = np.zeros((len(times_s), 4))
     places[:, 0] = 0.4 * times_s if moves else 0.0
