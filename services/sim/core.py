@@ -5,6 +5,7 @@ The same seed and the same commands at the same steps give the same messages.
 
 import math
 from collections.abc import Sequence
+from reprlib import repr as repr_of
 
 import worlds
 from common import messages as m
@@ -177,7 +178,7 @@ class Simulation:
         if world_name not in self.worlds():
             # Files of this machine are named by who starts it, not by who asks.
             known = ", ".join(self.worlds())
-            raise ResetError("world", f"no world {world_name!r}; there are {known}")
+            raise ResetError("world", f"no world {repr_of(world_name)}; there are {known}")
         world = worlds.load(world_name)
         stage = Stage(world, STEP_S)
         cast = []

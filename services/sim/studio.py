@@ -29,8 +29,12 @@ which others have the processor."""
 Choice = Literal["auto", "gl", "tiny", "none"]
 
 
-def open_renderer(choice: Choice) -> Renderer:
+def open_renderer(choice: Choice, aside: bool = False) -> Renderer:
     """The renderer of a choice; auto is OpenGL where there is any.
+
+    Args:
+        choice: what draws.
+        aside: whether one that keeps Python's lock while it draws gets a process of its own.
 
     Raises:
         NoOpenGlError: if OpenGL was asked for and there is none.
@@ -42,9 +46,10 @@ def open_renderer(choice: Choice) -> Renderer:
             if choice == "gl":
                 raise
             log.warning("no OpenGL (%s): pictures are drawn slowly by pybullet", error)
+    from services.sim.aside import Aside
     from services.sim.tiny import TinyRenderer
 
-    return TinyRenderer()
+    return Aside() if aside else TinyRenderer()
 
 
 def photograph(renderer: Renderer, camera: Camera, shot: Shot, quality: int) -> m.Image:
@@ -147,7 +152,7 @@ class Studio:
         cv2.setNumThreads(1)
         try:
             log.info("opening what draws; there are no pictures before")
-            renderer = open_renderer(self._choice)
+            renderer = open_renderer(self._choice, aside=True)
             self.renderer = renderer.name
             log.info("pictures are drawn by %s", renderer.name)
             self._ready = True

@@ -4,6 +4,7 @@ import importlib
 import importlib.util
 import pkgutil
 import traceback
+from reprlib import repr as repr_of
 
 from services.sim.inspection import faults_of
 from services.sim.plant import Plant
@@ -22,7 +23,7 @@ def load(name: str) -> type[Plant]:
             none of a vehicle, whose text names the file and what is wrong with it.
     """
     if name not in names():
-        raise ValueError(f"no plant {name!r}; there are {', '.join(names())}")
+        raise ValueError(f"no plant {repr_of(name)}; there are {', '.join(names())}")
     module = f"{__name__}.{name}"
     spec = importlib.util.find_spec(module)
     file = str(spec and spec.origin)

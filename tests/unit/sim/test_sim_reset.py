@@ -72,6 +72,15 @@ def test_a_bad_request_is_refused_and_the_flight_goes_on(
     assert simulation.state.velocity_mps[0] == pytest.approx(0.5, abs=0.05)
 
 
+def test_a_long_name_is_not_said_back_in_full() -> None:
+    simulation = Simulation(Config(world="empty", renderer="none"))
+    for request in (ResetRequest(world="x" * 100_000), ResetRequest(plant="x" * 100_000)):
+        with pytest.raises(ResetError, match=r"no (world|plant) 'x+\.\.\.x+'; there are") as caught:
+            simulation.reset(request)
+        assert len(str(caught.value)) < 200
+    simulation.close()
+
+
 @pytest.mark.parametrize(
     "settings",
     [

@@ -1,13 +1,16 @@
 """Pictures are taken beside physics: old shots are dropped, what draws them is chosen openly."""
 
+import os
 import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from common.camera import Lens
 from common.messages import Image, Message
 from services.sim import studio
+from services.sim.aside import Aside
 from services.sim.cameras import Camera, Shot, cameras_of
 from services.sim.config import Config
 from services.sim.optics import Renderer
@@ -54,7 +57,7 @@ def test_a_slow_renderer_drops_pictures_and_holds_up_nobody(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     renderer = SlowRenderer()
-    monkeypatch.setattr(studio, "open_renderer", lambda _choice: renderer)
+    monkeypatch.setattr(studio, "open_renderer", lambda _choice, aside: renderer)
     taken: list[Message] = []
     arrived = threading.Event()
 
@@ -82,7 +85,7 @@ def test_shots_from_below_wait_while_a_front_picture_is_drawn(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     renderer = SlowRenderer()
-    monkeypatch.setattr(studio, "open_renderer", lambda _choice: renderer)
+    monkeypatch.setattr(studio, "open_renderer", lambda _choice, aside: renderer)
     taken: list[Message] = []
     cameras = studio.Studio("gl", CAMERAS, 80, lambda _shot, message: taken.append(message))
     cameras.take(front_at(0))
@@ -101,7 +104,7 @@ def test_no_camera_starves_where_not_all_pictures_can_be_drawn(
 ) -> None:
     """Three shots come in each 33 ms, one can be drawn."""
     renderer = SlowRenderer()
-    monkeypatch.setattr(studio, "open_renderer", lambda _choice: renderer)
+    monkeypatch.setattr(studio, "open_renderer", lambda _choice, aside: renderer)
     taken: list[str] = []
     arrived = threading.Semaphore(0)
 
@@ -128,7 +131,7 @@ def test_what_waits_of_a_vehicle_that_is_reset_is_not_drawn_that_of_others_is(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     renderer = SlowRenderer()
-    monkeypatch.setattr(studio, "open_renderer", lambda _choice: renderer)
+    monkeypatch.setattr(studio, "open_renderer", lambda _choice, aside: renderer)
     taken: list[tuple[int, int]] = []
     fleet = (*CAMERAS, *cameras_of(Config(), 1))
     cameras = studio.Studio("gl", fleet, 80, lambda s, _: taken.append((s.vehicle, s.stamp_ns)))
@@ -147,7 +150,7 @@ def test_what_waits_of_a_vehicle_that_is_reset_is_not_drawn_that_of_others_is(
 
 def test_a_picture_that_cannot_be_published_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     renderer = SlowRenderer()
-    monkeypatch.setattr(studio, "open_renderer", lambda _choice: renderer)
+    monkeypatch.setattr(studio, "open_renderer", lambda _choice, aside: renderer)
 
     def refuse(_shot: Shot, _picture: Image) -> None:
         raise OSError("no network")
@@ -174,10 +177,35 @@ def test_without_opengl_pybullet_draws_unless_opengl_was_asked_for(
         studio.open_renderer("gl")
 
 
+def test_the_fallback_draws_the_same_in_a_process_of_its_own() -> None:
+    """It keeps Python's lock while it draws, which physics would wait for."""
+    scene = Scene((), (), "grass")
+    camera = replace(CAMERAS[0], lens=Lens.of_view(64, 48, 1.0))
+    (shot,) = front_at(0)
+    near = studio.open_renderer("tiny")
+    aside = studio.open_renderer("tiny", aside=True)
+    for renderer in (near, aside):
+        renderer.load(scene)
+    assert aside.name == near.name
+    assert np.array_equal(aside.draw(camera, shot), near.draw(camera, shot))
+    assert isinstance(aside, Aside)
+    assert aside._process.pid != os.getpid()
+    # What cannot be drawn is said, and the next picture is drawn.
+    with pytest.raises(KeyError):
+        aside.load(replace(scene, ground="snow"))  # type: ignore[arg-type]
+    aside.load(scene)
+    assert aside.draw(camera, shot).shape == (48, 64, 3)
+    aside._process.kill()
+    with pytest.raises(RuntimeError, match="has ended"):
+        aside.draw(camera, shot)
+    aside.close()
+    near.close()
+
+
 def test_a_renderer_that_fails_is_told_and_ends_only_the_pictures(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def fail(_choice: str) -> Renderer:
+    def fail(_choice: str, aside: bool) -> Renderer:
         raise NoOpenGlError("none here")
 
     monkeypatch.setattr(studio, "open_renderer", fail)
