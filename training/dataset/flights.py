@@ -19,7 +19,7 @@ from common import messages as m
 from common.clock import NS_PER_S, nanoseconds
 from training.dataset.primitive import Primitive
 from training.dataset.recordings import Logged, read_messages
-from training.dataset.track import Problem
+from training.dataset.track import Problem, utc_or_unknown
 from training.labels import CLASSES, NONE
 
 SOON_S = 2.0
@@ -182,7 +182,7 @@ def read_flight(
                 operator,
                 family,
                 f"{path.name} suggestion {outcome.suggestion.id} {outcome.fate}",
-                int(inside[0]),
+                utc_or_unknown(int(inside[0])),
             )
         )
     return primitives, counts, problems

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.clock import NS_PER_S
+from common.clock import NS_PER_S, nanoseconds
 from training.dataset.primitive import Array
 
 EARLIEST_UTC_S = 1e9
@@ -15,6 +15,11 @@ LATE_S = 1.0
 """Rows may be late or doubled; a clock that goes back further was set back."""
 BEYOND = 1e-6
 """Sticks may be beyond full by rounding."""
+
+
+def utc_or_unknown(stamp_ns: int) -> int:
+    """A stamp, or 0 if it is of another clock than UTC: simulated ones do not count from 1970."""
+    return stamp_ns if stamp_ns > nanoseconds(EARLIEST_UTC_S) else 0
 
 
 @dataclass(frozen=True)
@@ -50,8 +55,8 @@ class Track:
     held: tuple[tuple[str, ...], ...]
 
     def utc_ns(self, row: int) -> int:
-        """When a sample was sent, 0 if unknown: simulated clocks do not count from 1970."""
-        return round(self.times_s[row] * NS_PER_S) if self.times_s[row] > EARLIEST_UTC_S else 0
+        """When a sample was sent, 0 if unknown."""
+        return utc_or_unknown(round(self.times_s[row] * NS_PER_S))
 
 
 class TrackBuilder:

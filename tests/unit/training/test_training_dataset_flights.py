@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dataset_samples import STEP_NS, UTC_NS, circle, stick, write_recording
+from msgspec.structs import replace
 
 from common import messages as m
 from training.dataset.flights import SOON_S, read_flight
@@ -149,6 +150,19 @@ def test_a_suggestion_of_its_own_mind_keeps_its_primitive(tmp_path: Path) -> Non
     events = [intent("arc", 1.0, 4.0), suggestion(1, "line", 4.05), *flown(1, 5.0, "stick")]
     found, _, _ = read_flight(flight(tmp_path / "f.mcap", events), "ana", "")
     assert [p.label for p in found] == ["line"]
+
+
+def test_stamps_of_a_simulated_clock_are_no_utc(tmp_path: Path) -> None:
+    def restamped(message: m.Message) -> m.Message:
+        times = {"stamp", "window_start", "window_end"} & set(message.__struct_fields__)
+        return replace(message, **{name: getattr(message, name) - UTC_NS for name in times})
+
+    sticks = [("stick", stick(n, row), UTC_NS + n * STEP_NS) for n, row in enumerate(circle(1000))]
+    events = [*sticks, *shown(1), *flown(1, 5.0, "stick")]
+    events = [(topic, restamped(each), at_ns) for topic, each, at_ns in events]
+    path = write_recording(tmp_path / "f.mcap", sorted(events, key=lambda each: each[2]))
+    (primitive,) = read_flight(path, "ana", "")[0]
+    assert (primitive.utc_ns, len(primitive)) == (0, 151)
 
 
 def test_what_a_flight_lacks_is_told(tmp_path: Path) -> None:
