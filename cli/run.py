@@ -9,6 +9,7 @@ import textwrap
 from collections.abc import Sequence
 
 from cli import options as opts
+from common.config import choices_of
 from common.run import config_type_of, run_service
 from common.topics import SERVICES
 
@@ -24,14 +25,16 @@ def declare(parser: argparse.ArgumentParser) -> None:
     fields: list[str] = []
     if service is not None:
         group = parser.add_argument_group(f"configuration of {service}")
-        meanings = _meanings_in(config_type_of(service))
-        for field in dataclasses.fields(config_type_of(service)):
+        config_type = config_type_of(service)
+        meanings = _meanings_in(config_type)
+        for field in dataclasses.fields(config_type):
             flag = "--" + field.name.replace("_", "-")
+            choices = choices_of(config_type, field.name)
             group.add_argument(
                 flag,
                 dest=f"set_{field.name}",
-                metavar="VALUE",
-                help=f"{meanings.get(field.name, '')} ({field.default})".strip().replace("%", "%%"),
+                metavar=f"{{{','.join(choices)}}}" if choices else "VALUE",
+                help=f"{meanings.get(field.name, '')}{_shown(field.default)}".replace("%", "%%"),
             )
             fields.append(field.name)
     opts.add_examples(
@@ -42,6 +45,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "autocomplete run localizer --help     # with its configuration",
     )
     parser.set_defaults(action=_run, fields=fields)
+
+
+def _shown(default: object) -> str:
+    """A default as one would type it; of one that is nothing the meaning tells."""
+    if default is None or default == "":
+        return ""
+    return f" ({str(default).lower() if isinstance(default, bool) else default})"
 
 
 def _service_in(words: Sequence[str]) -> str | None:

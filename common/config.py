@@ -59,7 +59,8 @@ def _fault_of(config_type: type, key: str, values: Mapping[str, Any]) -> str:
         text = str(error).removesuffix(f" - at `$.{key}`")
         for prefix in (f"{key}: ", f"{key} "):
             text = text.removeprefix(prefix)
-        return text + _choices_of(config_type, key)
+        choices = choices_of(config_type, key)
+        return f"{text}; use {', '.join(choices)}" if choices else text
     return ""
 
 
@@ -69,12 +70,12 @@ def _is_right_beside(config_type: type, key: str, value: object, others: Mapping
     return not _fault_of(config_type, key, {**right, key: value})
 
 
-def _choices_of(config_type: type, key: str) -> str:
-    """What a field takes, if that can be counted."""
+def choices_of(config_type: type, key: str) -> tuple[str, ...]:
+    """All that a field takes, if that can be counted; else nothing."""
     kind = get_type_hints(config_type)[key]
-    choices = ("true", "false") if kind is bool else get_args(kind)
-    is_choice = kind is bool or get_origin(kind) is Literal
-    return f"; use {', '.join(map(str, choices))}" if is_choice else ""
+    if kind is bool:
+        return ("true", "false")
+    return tuple(map(str, get_args(kind))) if get_origin(kind) is Literal else ()
 
 
 def load(

@@ -105,6 +105,15 @@ def test_help_says_what_each_setting_of_a_service_means(service: str) -> None:
     assert all(meanings.get(field.name) for field in dataclasses.fields(config))
 
 
+def test_help_names_what_a_setting_can_be(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["run", "sim", "--help"])
+    text = capsys.readouterr().out
+    assert "--clock {real,lockstep}" in text
+    assert "--gusts {true,false}" in text
+    assert "--seed VALUE" in text
+
+
 @pytest.mark.parametrize("text", ["0", "-1", "nan", "inf", "soon", ""])
 def test_a_duration_is_more_than_nothing(text: str) -> None:
     with pytest.raises(argparse.ArgumentTypeError, match="seconds"):
