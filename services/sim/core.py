@@ -179,7 +179,10 @@ class Simulation:
             # Files of this machine are named by who starts it, not by who asks.
             known = ", ".join(self.worlds())
             raise ResetError("world", f"no world {repr_of(world_name)}; there are {known}")
-        world = worlds.load(world_name)
+        try:
+            world = worlds.load(world_name)
+        except worlds.WorldError as error:
+            raise ResetError("world", str(error)) from None
         stage = Stage(world, STEP_S)
         cast = []
         try:

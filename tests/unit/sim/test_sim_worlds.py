@@ -118,6 +118,13 @@ def test_a_file_of_ones_own_is_a_world_by_its_path(tmp_path: Path) -> None:
     assert simulation.state.position_m == pytest.approx((1.0, 2.0, 0.055))
     assert simulation.reset(ResetRequest(world="empty")).world == "empty"
     assert simulation.reset(ResetRequest(world=str(file))).world == str(file)
+    # A file that was spoilt meanwhile is refused as any.
+    simulation.reset(ResetRequest(world="empty"))
+    file.write_text("description: mine\nground: snow\n")
+    with pytest.raises(ResetError, match=r"hall\.yaml: .*snow.*; use asphalt") as caught:
+        simulation.reset(ResetRequest(world=str(file)))
+    assert caught.value.field == "world"
+    assert simulation.status().world == "empty"
     other = tmp_path / "other.yaml"
     other.write_text("description: not named at the start\n")
     with pytest.raises(ResetError, match="track"):
