@@ -16,7 +16,7 @@ from services.classifier.config import SHIPPED_MODEL
 
 if TYPE_CHECKING:
     from training.fit import Epoch
-    from training.train import Judged, Run
+    from training.outcome import Judged, Run
 
 PRESETS = ("shipped", "quick")
 

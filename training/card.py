@@ -1,15 +1,11 @@
 """The model card, made from a run: data, numbers, limits, hash."""
 
-from typing import TYPE_CHECKING
-
 from training.labels import PRIMITIVES
+from training.outcome import Judged, Run
 from training.people import WIDE, Share
 
-if TYPE_CHECKING:
-    from training.train import Judged, Run
 
-
-def _row(judged: "Judged") -> str:
+def _row(judged: Judged) -> str:
     whole = judged.whole
     early = " | ".join(f"{s.f1:.3f}" for _, s in judged.early)
     return (
@@ -19,7 +15,7 @@ def _row(judged: "Judged") -> str:
     )
 
 
-def _confusion(judged: "Judged") -> str:
+def _confusion(judged: Judged) -> str:
     head = f"| was \\ said | {' | '.join(PRIMITIVES)} |\n|{'---|' * (len(PRIMITIVES) + 1)}\n"
     rows = (
         f"| {label} | {' | '.join(str(n) for n in row)} |\n"
@@ -32,7 +28,7 @@ def _share(name: str, share: Share, size: int) -> str:
     return f"| {name} | {share.wide_people} | {share.thesis_people} | {size} |"
 
 
-def card_of(run: "Run") -> str:
+def card_of(run: Run) -> str:
     """The card as Markdown."""
     preset, first = run.preset, run.judged[0]
     early = " | ".join(f"F1 {after:g} s" for after, _ in first.early)

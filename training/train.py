@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Protocol
 
@@ -14,36 +14,13 @@ from training.export import export, save
 from training.fit import FULL_YAW_RADPS, Budget, Epoch, Fitted, Training
 from training.labels import PRIMITIVES
 from training.network import VERSION
+from training.outcome import Judged, Preset, Run
 from training.people import Share, people_of
-from training.scores import (
-    Score,
-    calibration_error,
-    confidence_bins,
-    none_auroc,
-    score,
-    weighted_f1,
-)
+from training.scores import calibration_error, confidence_bins, none_auroc, score, weighted_f1
 from training.windows import MOMENTS_S, NONE_INDEX, Examples, Windows, examples_of, seen_after
 
 MODEL_NAME = "intent"
 PARITY_ROWS = 200
-
-
-@dataclass(frozen=True)
-class Preset:
-    """How much to train on.
-
-    Attributes:
-        training: people to learn from.
-        validation: people to choose and calibrate by.
-        test: people to judge on.
-        budget: how long.
-    """
-
-    training: Share
-    validation: Share
-    test: Share
-    budget: Budget
 
 
 PRESETS = {
@@ -76,42 +53,6 @@ class Progress(Protocol):
     def epoch(self, epoch: Epoch, epochs: int) -> None:
         """An epoch is over."""
         ...
-
-
-@dataclass(frozen=True)
-class Judged:
-    """The model's scores on people of one population, whom it has not learned from.
-
-    Attributes:
-        name: of the population.
-        whole: at the end of each primitive.
-        early: (seconds since the motion began, score).
-        calibration: expected calibration error, over the end and all early moments.
-        auroc: of `meant`, primitives against none, at the end.
-        families: weighted F1 by kind of people, at the end.
-    """
-
-    name: str
-    whole: Score
-    early: tuple[tuple[float, Score], ...]
-    calibration: float
-    auroc: float
-    families: dict[str, float]
-
-
-@dataclass(frozen=True)
-class Run:
-    """All that a training run found; the card and the printed table are made of it."""
-
-    preset_name: str
-    preset: Preset
-    seed: int
-    sizes: dict[str, int]
-    judged: tuple[Judged, ...]
-    fitted: Fitted
-    sha256: str
-    path: Path
-    parity: float
 
 
 def answers_of(model: OnnxModel, windows: Windows) -> tuple[np.ndarray, np.ndarray]:

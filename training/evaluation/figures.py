@@ -34,6 +34,8 @@ DPI = 110
 PICTURE_OF_BARS = "bars.png"
 LENGTHS_OF = 40
 """So many people's primitives are drawn by their lengths."""
+FEWEST_IN_A_BIN = 20
+"""Answers: of fewer a share says nothing."""
 
 Drawn = tuple[str, str]
 
@@ -147,7 +149,7 @@ def _reliability(results: Results, path: Path) -> str:
     ):
         tally = results.pooled(OURS, people, tuple(MOMENTS))
         answers, confidence, right = tally.bins.T
-        full = answers >= 20
+        full = answers >= FEWEST_IN_A_BIN
         panel, below = panels[:, column]
         panel.plot(
             [0.25, 1], [0.25, 1], color="#999999", linestyle="--", label="as confident as right"
@@ -173,7 +175,8 @@ def _reliability(results: Results, path: Path) -> str:
     _save(figure, path)
     return (
         "Reliability: how often answers of a confidence are right, at all moments and seeds"
-        f" together (n = {counts[0]} and {counts[1]} windows; bins of fewer than 20 are left out)."
+        f" together (n = {counts[0]} and {counts[1]} windows;"
+        f" bins of fewer than {FEWEST_IN_A_BIN} are left out)."
     )
 
 

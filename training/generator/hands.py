@@ -5,13 +5,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from common.sticks import FULL_STICK
 from training.generator.noise import STEP_S, Array, pulses, slow, tremor, wander
 from training.generator.people import People
 from training.generator.shapes import Shapes
 
-FULL_UP_MPS = 0.5
-FULL_YAW_RADPS = 1.0
-"""Full stick of the tum plant; it also is 1 m/s forward and sideways."""
+FULL_UP_MPS = FULL_STICK["tum"].up_mps
+FULL_YAW_RADPS = FULL_STICK["tum"].yaw_radps
+"""Of the vehicle that simulated people fly; forward and sideways it makes 1 m/s."""
 LEAD_OUT_SHARE = 0.6
 """Those who let go of the stick before they press the stop button."""
 YAW_ALSO_SHARE = 0.3

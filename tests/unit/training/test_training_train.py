@@ -12,8 +12,9 @@ from training import train as training
 from training.dataset.primitive import Primitive
 from training.fit import Budget, Epoch
 from training.labels import PRIMITIVES
+from training.outcome import Preset
 from training.people import Share, people_of
-from training.train import Preset, train
+from training.train import train
 
 TINY = Preset(
     training=Share(wide_people=12, wide=0.03, thesis_people=6, thesis=0.02),
