@@ -116,6 +116,20 @@ def test_pressing_accept_reaches_the_autopilot_with_what_is_on_the_screen(
     assert requests[1]["nonce"] != requests[0]["nonce"]
 
 
+def test_a_refusal_says_what_to_do(client, world, open_page):
+    def refuse(query: Any) -> None:
+        with query:
+            reply = {"ok": False, "reason": "stick", "mode": "manual"}
+            query.reply(query.key_expr, msgpack.packb(reply))
+
+    queryable = client.session.declare_queryable(client.key("autopilot/decide"), refuse)
+    page = open_page("/")
+    wait_until(page, lambda: is_offered(page))
+    page.keyboard.press("Enter")
+    wait_until(page, lambda: page.inner_text("#answer") == "Refused: let go of the sticks first")
+    queryable.undeclare()
+
+
 @pytest.mark.parametrize("path", PAGES)
 def test_a_key_moves_the_stick_and_letting_go_is_neutral(client, world, open_page, path):
     page = open_page(path)

@@ -5,6 +5,18 @@ const ANSWER_SHOWN_MS = 4000;
 /** A charge below this is a warning, as in the picture's strip. */
 const BATTERY_LOW = 0.2;
 
+/** What a person does about a refusal; the autopilot's other reasons read well as they are. */
+const REFUSALS: Readonly<Record<string, string>> = {
+  stick: "let go of the sticks first",
+  stick_lost: "no sticks arrive",
+  unknown: "nothing is suggested",
+  stale: "the suggestion is too old, fly on",
+  pose_lost: "the vehicle does not know where it is",
+  battery_low: "the battery is too low",
+  plant: "this vehicle cannot fly paths",
+  late: "the autopilot stood still, try again",
+};
+
 /** The page's element with an id, of a kind if one is given. */
 export function element(id: string): HTMLElement;
 export function element<E extends HTMLElement>(id: string, kind: new () => E): E;
@@ -67,7 +79,8 @@ export class View {
 
   answer(answer: Answer): void {
     const line = element("answer");
-    line.textContent = `${answer.ok ? "Done" : "Refused"}: ${answer.reason.replaceAll("_", " ")}`;
+    const reason = answer.reason.replaceAll("_", " ");
+    line.textContent = answer.ok ? `Done: ${reason}` : `Refused: ${REFUSALS[answer.reason] ?? reason}`;
     line.dataset["ok"] = String(answer.ok);
     this.answerUntil_ms = performance.now() + ANSWER_SHOWN_MS;
   }
