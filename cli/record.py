@@ -46,13 +46,26 @@ class _Arrival:
     utc_ns: int
 
 
-def _listen(bus: ZenohBus, vehicle: str, arrived: "queue.Queue[_Arrival]") -> None:
+class _Inbox:
+    """What arrived and waits for the disk; what finds no room is lost, and counted."""
+
+    def __init__(self) -> None:
+        self.waiting: queue.Queue[_Arrival] = queue.Queue(BEHIND)
+        self.lost = 0
+
+    def put(self, arrival: _Arrival) -> None:
+        try:
+            self.waiting.put_nowait(arrival)
+        except queue.Full:
+            self.lost += 1
+
+
+def _listen(bus: ZenohBus, vehicle: str, inbox: _Inbox) -> None:
     clock = SystemClock()
 
     def subscribe(name: str, is_video: bool) -> None:
         def receive(payload: bytes) -> None:
-            if not arrived.full():
-                arrived.put_nowait(_Arrival(name, payload, clock.utc_ns()))
+            inbox.put(_Arrival(name, payload, clock.utc_ns()))
 
         bus.subscribe(key_of(vehicle, name), receive, video=is_video)
 
@@ -70,7 +83,7 @@ def _run(options: argparse.Namespace) -> int:
             f"{error.name} is missing; install it with pip install -e '.[recorder]'"
         ) from None
     clock = SystemClock()
-    arrived: queue.Queue[_Arrival] = queue.Queue(BEHIND)
+    inbox = _Inbox()
     config = Config()
     with linked(options) as bus:
         stop = stop_on_signals()
@@ -80,7 +93,7 @@ def _run(options: argparse.Namespace) -> int:
         meter = Meter(begin_ns)
         invalid = 0
         try:
-            _listen(bus, options.vehicle, arrived)
+            _listen(bus, options.vehicle, inbox)
 
             def line() -> Text:
                 now_ns = clock.monotonic_ns()
@@ -91,13 +104,14 @@ def _run(options: argparse.Namespace) -> int:
                     f"  {meter.rate_hz(now_ns):.0f} Hz"
                     f"  {recording.size_bytes() / 1e6:.1f} MB"
                     + (f"  {invalid} invalid" if invalid else "")
+                    + (f"  {inbox.lost} lost" if inbox.lost else "")
                 )
 
             end_ns = None if options.seconds is None else begin_ns + nanoseconds(options.seconds)
             with Live(get_renderable=line, console=Console(stderr=True), refresh_per_second=2):
                 while not stop.is_set() and (end_ns is None or clock.monotonic_ns() < end_ns):
                     try:
-                        arrival = arrived.get(timeout=POLL_S)
+                        arrival = inbox.waiting.get(timeout=POLL_S)
                     except queue.Empty:
                         continue
                     try:

@@ -135,15 +135,13 @@ def _run(options: argparse.Namespace) -> int:
         while not stop.is_set() and collected.taken < options.count:
             try:
                 stick = m.decode(arrived.get(timeout=POLL_S), m.Stick)
-            except queue.Empty:
+            except (queue.Empty, m.InvalidPayloadError):
                 if clock.monotonic_ns() - heard_ns > nanoseconds(SILENT_S):
                     console.print(
                         f"[yellow]no sticks of {options.vehicle}[/]:"
                         " is 'autocomplete up' or 'autocomplete run operator' running?"
                     )
                     heard_ns = clock.monotonic_ns()
-                continue
-            except m.InvalidPayloadError:
                 continue
             heard_ns = clock.monotonic_ns()
             event = collection.add(stick)
