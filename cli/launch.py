@@ -19,7 +19,7 @@ from rich.console import Console
 
 from common import config
 from common.clock import SystemClock, nanoseconds, sleep
-from common.network import ROUTER_PORT
+from common.network import DEFAULT_ENDPOINT, ROUTER_PORT
 from common.run import ENDS_WITH_STDIN, config_type_of
 from common.topics import DEFAULT_VEHICLE, SERVICES
 
@@ -210,6 +210,10 @@ def say_where(system: System) -> None:
     console = Console(stderr=True, highlight=False)
     console.print(f"console    {system.console}")
     console.print(f"router     {system.endpoint}")
+    if system.endpoint != DEFAULT_ENDPOINT:
+        console.print(
+            f"           port {ROUTER_PORT} is taken: --connect {system.endpoint} leads here"
+        )
     if "recorder" in system.configs:
         console.print(f"recording  into {Path(system.configs['recorder'].folder).resolve()}")
     console.print(f"logs       {system.logs}")

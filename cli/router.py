@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import sys
 
 import zenoh
 
@@ -9,6 +10,9 @@ from cli import options as opts
 from common.network import ROUTER_PORT
 from common.run import stop_on_signals
 from common.zenoh_bus import router_config
+
+POLL_S = 0.5
+"""Python hears of a signal that another thread took only once the main one wakes."""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -35,15 +39,17 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def _run(options: argparse.Namespace) -> int:
     stop = stop_on_signals()
     config = router_config(options.listen, options.config)
+    endpoints = json.loads(config.get_json("listen/endpoints"))
     try:
         session = zenoh.open(config)
     except zenoh.ZError as error:
         reason = str(error).split(" at /", 1)[0]
-        endpoints = json.loads(config.get_json("listen/endpoints"))
         listen, mend = f"the endpoints of {options.config}", "there"
         if endpoints == [options.listen]:
             listen, mend = options.listen, "with --listen"
         raise OSError(f"cannot listen on {listen}: {reason}; name another {mend}") from None
     with session:
-        stop.wait()
+        sys.stderr.write(f"router listens on {', '.join(endpoints)}; Ctrl-C stops it\n")
+        while not stop.wait(POLL_S):
+            pass
     return 0

@@ -137,5 +137,6 @@ def _run(options: argparse.Namespace) -> int:
             refresh_per_second=1 / REFRESH_S,
             screen=False,
         ):
-            stop.wait()
+            while not stop.wait(REFRESH_S):
+                pass
     return 0

@@ -1,6 +1,8 @@
 """The commands as a person runs them: processes, a real router, exit codes and what they print."""
 
+import ctypes
 import json
+import platform
 import re
 import signal
 import socket
@@ -230,6 +232,19 @@ def test_a_router_routes_between_two_clients_and_stops_on_sigterm() -> None:
         assert process.wait(5.0) == 0
         reader.close()
         writer.close()
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="a system call is known by number")
+def test_a_router_says_where_it_listens_and_hears_a_signal_that_another_thread_took() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    words = [COMMAND, "router", "--listen", endpoint]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert endpoint in process.stderr.readline()
+        threads = [int(task.name) for task in Path(f"/proc/{process.pid}/task").iterdir()]
+        tgkill = 234
+        assert ctypes.CDLL(None).syscall(tgkill, process.pid, max(threads), signal.SIGTERM) == 0
+        assert process.wait(TIMEOUT_S) == 0
 
 
 def test_a_router_takes_a_configuration_file(tmp_path: Path) -> None:
