@@ -101,10 +101,10 @@ train: $(VENV)/.all ## train the model anew into models/
 	$(BIN)/autocomplete train $(ARGS)
 
 picture: setup $(VENV)/.all ## the README's picture anew: flies the demo and photographs the console
-	$(BIN)/python docs/picture.py
+	$(BIN)/python -P docs/picture.py
 
 shapes: $(VENV)/.all ## the figure of what is suggested
-	$(BIN)/python docs/shapes.py
+	$(BIN)/python -P docs/shapes.py
 
 vehicles: $(VENV)/.all ## the docs' picture of several vehicles
 	$(BIN)/python -P docs/vehicles.py

@@ -37,6 +37,12 @@ def test_each_make_target_named_in_the_docs_exists(target: str) -> None:
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), flags=re.M)
 
 
+def test_scripts_of_the_docs_are_run_without_their_folder_on_the_path() -> None:
+    # docs/worlds would hide the package `worlds`.
+    runs = re.findall(r"python (.*)docs/\w+\.py", (ROOT / "Makefile").read_text())
+    assert runs == ["-P "] * 3
+
+
 @pytest.mark.parametrize(("command", "flags"), sorted(flags_by_command().items()))
 def test_each_command_printed_in_the_docs_takes_its_flags(command: str, flags: set[str]) -> None:
     entry_point = Path(sys.executable).with_name("autocomplete")
