@@ -142,14 +142,17 @@ def _run(options: argparse.Namespace) -> int:
         bars = _Bars(progress)
         if options.ablation is not None:
             return _ablation(console, options, bars)
-        run = train(
-            preset,
-            seed,
-            options.out or Path("models/quick" if preset == "quick" else "models"),
-            bars,
-            resume=options.resume,
-            processes=1 if preset == "quick" else min(4, os.cpu_count() or 1),
-        )
+        try:
+            run = train(
+                preset,
+                seed,
+                options.out or Path("models/quick" if preset == "quick" else "models"),
+                bars,
+                resume=options.resume,
+                processes=1 if preset == "quick" else min(4, os.cpu_count() or 1),
+            )
+        except KeyboardInterrupt:
+            raise OSError("stopped; --resume goes on after the last whole epoch") from None
     _report(console, run)
     return 0
 

@@ -93,6 +93,19 @@ def test_the_same_seed_gives_the_same_file_stopped_and_resumed_or_not(tmp_path: 
     assert one.sha256 == other.sha256 == resumed.sha256 != different.sha256
 
 
+def test_a_run_that_is_stopped_has_failed_and_says_how_to_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(training, "train", stopped)
+    assert main(["train", "--preset", "quick", "--out", str(tmp_path)]) == 1
+    assert capsys.readouterr().err == (
+        "autocomplete train: stopped; --resume goes on after the last whole epoch\n"
+    )
+
+
 def test_a_run_goes_on_with_the_people_it_began_with_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
