@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,25 @@ class Record:
         told, _ = self.popen.communicate(timeout=15.0)
         assert self.popen.returncode == 0, self._log.read_text()
         return told
+
+
+Start = Callable[[str, Path, str, int], Record]
+
+
+@pytest.fixture
+def start(port: int) -> Iterator[Start]:
+    """Starts the command; none outlives the test."""
+    started: list[Record] = []
+
+    def record(vehicle: str, out: Path, label: str, count: int) -> Record:
+        started.append(Record(port, vehicle, out, label, count))
+        return started[-1]
+
+    yield record
+    for each in started:
+        if each.popen.poll() is None:
+            each.popen.kill()
+            each.popen.wait()
 
 
 class Hands:
@@ -100,11 +120,11 @@ def wait_for(path: Path, labels: list[str]) -> None:
 
 
 def test_primitives_are_collected_saved_one_by_one_and_gone_on_with(
-    hands: Hands, client: Client, port: int, vehicle: str, tmp_path: Path
+    hands: Hands, client: Client, start: Start, vehicle: str, tmp_path: Path
 ) -> None:
     out = tmp_path / "ana.npz"
     client.next("stick")
-    first = Record(port, vehicle, out, "arc", 2)
+    first = start(vehicle, out, "arc", 2)
     first.wait_told("Ctrl-C ends")
     hands.perform(1.6)
     wait_for(out, ["arc"])
@@ -113,7 +133,7 @@ def test_primitives_are_collected_saved_one_by_one_and_gone_on_with(
     hands.perform(1.8)
     assert first.end() == f"{out}: 2 more, line 0  arc 2  sine 0  helix 0  none 0\n"
 
-    second = Record(port, vehicle, out, "none", 5)
+    second = start(vehicle, out, "none", 5)
     second.wait_told("Ctrl-C ends")
     hands.perform(1.8)
     wait_for(out, ["arc", "arc", "none"])
@@ -128,17 +148,17 @@ def test_primitives_are_collected_saved_one_by_one_and_gone_on_with(
     np.testing.assert_allclose(durations_s, [1.6, 1.8], atol=0.3)
 
 
-def test_without_sticks_it_says_what_to_start(port: int, router: object, tmp_path: Path) -> None:
-    record = Record(port, "nobody", tmp_path / "ana.npz", "arc", 1)
+def test_without_sticks_it_says_what_to_start(start: Start, router: object, tmp_path: Path) -> None:
+    record = start("nobody", tmp_path / "ana.npz", "arc", 1)
     record.wait_told("no sticks of nobody: is 'autocomplete up'")
     record.popen.send_signal(signal.SIGINT)
     assert record.end()
 
 
-def test_a_file_that_is_no_set_is_not_written_over(port: int, tmp_path: Path) -> None:
+def test_a_file_that_is_no_set_is_not_written_over(start: Start, tmp_path: Path) -> None:
     out = tmp_path / "ana.npz"
     out.write_text("something else")
-    record = Record(port, "nobody", out, "arc", 1)
+    record = start("nobody", out, "arc", 1)
     assert record.popen.wait(15.0) == 1
     record.wait_told(f"autocomplete dataset: {out} is no data set")
     assert out.read_text() == "something else"
