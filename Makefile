@@ -29,7 +29,7 @@ $(VENV)/.services: pyproject.toml constraints.txt | $(BIN)/python
 # torch comes with this one: an extra that only training and its tests need.
 $(VENV)/.all: $(VENV)/.services
 	@echo "Installing tests, checks and training into $(VENV): about 400 MB once, gigabytes more where"
-	@echo "torch comes with CUDA; PIP_EXTRA_INDEX_URL=https://download.pytorch.org/whl/cpu spares them"
+	@echo "torch comes with CUDA: PIP_EXTRA_INDEX_URL, set to PyTorch's index of CPU builds, spares them"
 	$(PIP) -e '.[services,training,test,check]'
 	@touch $@
 

@@ -10,7 +10,6 @@ import sys
 import urllib.request
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 from rich.console import Console
@@ -19,6 +18,7 @@ from rich.table import Table
 
 from cli import launch
 from cli import options as opts
+from cli.extras import FOLDER, installs
 from cli.link import alive_services, linked
 from common.clock import sleep
 from common.network import DEFAULT_ENDPOINT, ROUTER_PORT
@@ -34,7 +34,6 @@ TOKENS_WAIT_S = 0.5
 PAGE_TIMEOUT_S = 1.0
 _COLOURS = {"ok": "green", "note": "dim", "warn": "yellow", "fail": "red"}
 _PROJECT = "autocomplete-teleoperation"
-_FOLDER = Path(__file__).parents[1]
 _USES = {"training": "to train", "test": "to run the tests", "check": "to run make check"}
 """What the extras are for that no flight needs."""
 
@@ -87,12 +86,6 @@ def _is_installed(package: str) -> bool:
     return True
 
 
-def _pip() -> str:
-    """This Python's pip, as it is typed in the project's folder."""
-    pip = Path(sys.executable).with_name("pip")
-    return str(pip.relative_to(_FOLDER) if pip.is_relative_to(_FOLDER) else pip)
-
-
 def _packages() -> Iterator[Finding]:
     for extra in (*SERVICES, *_USES):
         missing = [name for name in _requirements_of(extra) if not _is_installed(name)]
@@ -102,7 +95,7 @@ def _packages() -> Iterator[Finding]:
             continue
         # A machine may run a part of the chain, so a missing part is no failure.
         use = _USES.get(extra, "to run it here")
-        mend = f"{use}: {_pip()} install -c constraints.txt -e '.[{extra}]'"
+        mend = f"{use}: {installs(extra)}"
         state: State = "note" if extra in _USES else "warn"
         yield Finding(subject, state, f"{', '.join(missing)} missing", mend)
 
@@ -142,7 +135,7 @@ def _output_of(*command: str) -> str | None:
 
 
 def _node() -> Finding:
-    page = _FOLDER / "services/overlay/console/dist/index.html"
+    page = FOLDER / "services/overlay/console/dist/index.html"
     built = "the console is built" if page.is_file() else "the console is its plain page"
     version = _output_of("node", "--version")
     npm = _output_of("npm", "--version")
@@ -178,7 +171,7 @@ def _docker() -> Finding:
 
 
 def _model() -> Finding:
-    folder = _FOLDER / "models"
+    folder = FOLDER / "models"
     found = sorted(path.name for path in folder.glob("*.onnx"))
     if found:
         return Finding("model", "ok", ", ".join(found))

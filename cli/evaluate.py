@@ -9,6 +9,7 @@ from rich.progress import Progress, TaskID
 from rich.table import Table as Grid
 
 from cli import options as opts
+from cli.extras import needing
 from cli.progress import counted
 
 if TYPE_CHECKING:
@@ -91,14 +92,10 @@ class _Bars:
 
 
 def _run(options: argparse.Namespace) -> int:
-    try:
+    with needing("training"):
         from common.clock import SystemClock
         from training.evaluation.contenders import CONTENDERS
         from training.evaluation.run import ALL_SEEDS, Order, evaluate
-    except ModuleNotFoundError as error:
-        raise OSError(
-            f"{error.name} is missing; install it with pip install -e '.[training]'"
-        ) from None
     models = CONTENDERS
     if options.models is not None:
         models = tuple(name.strip() for name in options.models.split(","))

@@ -55,7 +55,9 @@ def main(arguments: list[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except KeyboardInterrupt:
-        return 0
+        # Of what runs until it is stopped, no signal comes as far as this.
+        sys.stderr.write(f"autocomplete {arguments[0]}: stopped\n")
+        return 1
     except Exception as error:
         if os.environ.get(DEBUG):
             raise

@@ -10,6 +10,7 @@ from rich.live import Live
 from rich.text import Text
 
 from cli import options as opts
+from cli.extras import needing
 from cli.link import linked
 from cli.meter import Meter
 from common import messages as m
@@ -75,13 +76,9 @@ def _listen(bus: ZenohBus, vehicle: str, inbox: _Inbox) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    try:
+    with needing("recorder"):
         from services.recorder.config import Config
         from services.recorder.recording import Recording, new_path, open_new
-    except ModuleNotFoundError as error:
-        raise OSError(
-            f"{error.name} is missing; install it with pip install -e '.[recorder]'"
-        ) from None
     clock = SystemClock()
     inbox = _Inbox()
     config = Config()

@@ -9,6 +9,7 @@ import textwrap
 from collections.abc import Sequence
 
 from cli import options as opts
+from cli.extras import needing
 from common.config import choices_of
 from common.run import config_type_of, run_service
 from common.topics import SERVICES
@@ -76,7 +77,7 @@ def _meanings_in(config_type: type) -> dict[str, str]:
 
 
 def _run(options: argparse.Namespace) -> int:
-    try:
+    with needing(options.service):
         return run_service(
             options.service,
             options.vehicle,
@@ -85,8 +86,3 @@ def _run(options: argparse.Namespace) -> int:
             options.zenoh_config,
             {name: getattr(options, f"set_{name}") for name in options.fields},
         )
-    except ModuleNotFoundError as error:
-        raise OSError(
-            f"{options.service} needs {error.name};"
-            f" install it with pip install -e '.[{options.service}]'"
-        ) from None

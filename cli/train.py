@@ -11,6 +11,7 @@ from rich.progress import Progress, TaskID
 from rich.table import Table
 
 from cli import options as opts
+from cli.extras import needing
 from cli.progress import counted
 from services.classifier.config import SHIPPED_MODEL
 
@@ -131,10 +132,8 @@ def _run(options: argparse.Namespace) -> int:
     _require_one_job(options)
     if options.finetune is not None:
         return _finetune(Console(), options)
-    try:
+    with needing("training"):
         from training.train import train
-    except ModuleNotFoundError as error:
-        raise _missing(error) from None
     # Not argparse's defaults: what was said must be known, and it forgets what equals a default.
     seed, preset = options.seed or 0, options.preset or "shipped"
     console = Console()
@@ -157,18 +156,12 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _missing(error: ModuleNotFoundError) -> OSError:
-    return OSError(f"{error.name} is missing; install it with pip install -e '.[training]'")
-
-
 def _finetune(console: Console, options: argparse.Namespace) -> int:
-    try:
+    with needing("training"):
         from training.dataset.check import load_sound
 
         primitives, findings = load_sound(options.finetune)
         from training.finetune import finetune
-    except ModuleNotFoundError as error:
-        raise _missing(error) from None
     for finding in findings:
         # What is wrong with a person as a whole leaves nobody's rows out.
         fate = "left out" if finding.row is not None else "look at this"

@@ -72,7 +72,7 @@ def _is_right_beside(config_type: type, key: str, value: object, others: Mapping
 
 def choices_of(config_type: type, key: str) -> tuple[str, ...]:
     """All that a field takes, if that can be counted; else nothing."""
-    kind = get_type_hints(config_type)[key]
+    kind = get_type_hints(config_type).get(key)
     if kind is bool:
         return ("true", "false")
     return tuple(map(str, get_args(kind))) if get_origin(kind) is Literal else ()

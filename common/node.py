@@ -19,6 +19,7 @@ import numpy as np
 from common import messages as m
 from common.bus import Bus, Publication, QueryFailedError, Request
 from common.clock import Clock, SystemClock, nanoseconds, seconds
+from common.config import choices_of
 from common.log import RateLimited
 from common.topics import QUERIES, TOPICS, Delivery, Query, Topic, alive_key_of, key_of
 from common.version import VERSION
@@ -304,7 +305,7 @@ class Node:
             question = m.decode(request.payload, server.query.request)
             reply = m.encode(server.handler(question, self.clock.monotonic_ns()))
         except m.InvalidPayloadError as error:
-            refusal = m.QueryError(error=str(error), field=_field_in(str(error), server.query))
+            refusal = _refusal_of(str(error), server.query)
             request.refuse(m.encode(refusal), m.encoding_of(m.QueryError))
         except RefusedError as error:
             refusal = m.QueryError(error=str(error), field=error.field_name)
@@ -373,6 +374,15 @@ def _percentiles(samples: Iterable[float]) -> tuple[float, float]:
         return 0.0, 0.0
     p50, p99 = np.percentile(values, [50, 99])
     return float(p50), float(p99)
+
+
+def _refusal_of(error: str, query: Query) -> m.QueryError:
+    """What a request that cannot be decoded is answered: its field, and what that can be."""
+    field_name = _field_in(error, query)
+    choices = choices_of(query.request, field_name) if field_name else ()
+    return m.QueryError(
+        error=f"{error}; use {', '.join(choices)}" if choices else error, field=field_name
+    )
 
 
 def _field_in(error: str, query: Query) -> str | None:

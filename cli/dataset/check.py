@@ -3,7 +3,7 @@
 import argparse
 
 from cli import options as opts
-from cli.dataset import shared
+from cli.extras import needing
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -24,7 +24,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    with shared.training_installed():
+    with needing("training"):
         from training.dataset.check import check_stored
         from training.dataset.store import open_set
     is_wrong = False

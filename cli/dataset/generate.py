@@ -8,6 +8,7 @@ from rich.console import Console
 
 from cli import options as opts
 from cli.dataset import shared
+from cli.extras import needing
 from cli.progress import counted
 from training.labels import NONE
 
@@ -58,7 +59,7 @@ def _multiple(text: str) -> float:
 
 
 def _run(options: argparse.Namespace) -> int:
-    with shared.training_installed():
+    with needing("training"):
         from training.dataset.store import save
         from training.generator.dataset import THESIS, counts_of, generate, populate
     # What is there may be somebody's performances, which no seed brings back.

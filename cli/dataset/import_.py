@@ -11,6 +11,7 @@ from rich.table import Table
 
 from cli import options as opts
 from cli.dataset import shared
+from cli.extras import needing
 from cli.progress import counted
 from training.labels import CLASSES, PRIMITIVES
 
@@ -228,7 +229,7 @@ def _require_flights(options: argparse.Namespace) -> None:
 
 def _read(path: Path, options: argparse.Namespace, rules: "Rules", console: Console) -> "Reading":
     """What a file gives, or its one problem."""
-    with shared.training_installed():
+    with needing("training"):
         from training.dataset.flights import read_flight
         from training.dataset.reading import Reading, at_lengths, operator_of, read_file
         from training.dataset.track import Problem
@@ -260,7 +261,7 @@ def _sound(primitives: "list[Primitive]") -> "list[Primitive]":
 
 
 def _run(options: argparse.Namespace) -> int:
-    with shared.training_installed():
+    with needing("training"):
         from training.dataset.store import open_set, save
     if options.ignored_is_none and not options.from_flights:
         raise ValueError("--ignored-is-none goes with --from-flights")

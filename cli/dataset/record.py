@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from cli import options as opts
 from cli.dataset import shared
+from cli.extras import needing
 from cli.link import linked
 from cli.progress import counted
 from common import messages as m
@@ -112,7 +113,7 @@ class _Set:
 
 
 def _run(options: argparse.Namespace) -> int:
-    with shared.training_installed():
+    with needing("training"):
         from training.dataset.collection import Collection
     collected = _Set(options)
     collection = Collection(

@@ -1,29 +1,13 @@
-"""What the subcommands share: types of options, the extra they need, problems as lines."""
+"""What the subcommands share: types of options, problems as lines."""
 
 import argparse
-import contextlib
 import shlex
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 PROBLEMS_SHOWN = 20
 """Of each file, on a terminal; a wrong option makes every row of a file a problem."""
-
-
-@contextlib.contextmanager
-def training_installed() -> Iterator[None]:
-    """Tells how to get a package that an import inside lacks.
-
-    Raises:
-        OSError: if one is missing.
-    """
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        raise OSError(
-            f"{error.name} is missing; install it with pip install -e '.[training]'"
-        ) from None
 
 
 def set_file(text: str) -> Path:

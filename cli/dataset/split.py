@@ -4,6 +4,7 @@ import argparse
 
 from cli import options as opts
 from cli.dataset import shared
+from cli.extras import needing
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -19,7 +20,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    with shared.training_installed():
+    with needing("training"):
         from training.dataset.split import split_by_operator
         from training.dataset.store import open_set, save
     stored = open_set(options.file)

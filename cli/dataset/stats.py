@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from cli import options as opts
-from cli.dataset import shared
+from cli.extras import needing
 from training.labels import CLASSES
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def _figure(text: str) -> Path:
 
 
 def _run(options: argparse.Namespace) -> int:
-    with shared.training_installed():
+    with needing("training"):
         from training.dataset.store import open_set
         from training.dataset.summary import by_class, group_of, grouped
     stored = [open_set(path) for path in options.files]
@@ -64,7 +64,7 @@ def _run(options: argparse.Namespace) -> int:
         told = ", ".join(f"{name}: {text}" for name, text in sorted(one.provenance.items()))
         console.print(f"{one.path}: {told}", markup=False, highlight=False, soft_wrap=True)
     if options.figure is not None:
-        with shared.training_installed():
+        with needing("training"):
             from training.dataset.figures import draw_lengths
         names = ", ".join(path.name for path in options.files)
         title = f"Lengths of {len(primitives)} primitives: {names}"

@@ -252,6 +252,9 @@ def test_a_question_is_answered_refused_or_found_bad(world: World) -> None:
     ):
         refused = answered(world, node, ask, msgpack.packb(bad))["refused"]
         assert refused["field"] == field
+        assert ("use accept, cancel, takeoff, land, emergency" in refused["error"]) == (
+            field == "action"
+        )
         assert refused["error"]
     assert answered(world, node, ask, b"\xff\x00noise")["refused"]["error"]
 
