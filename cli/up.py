@@ -64,8 +64,8 @@ def _run(options: argparse.Namespace) -> int:
                 alive = alive_services(bus, system.vehicle)
                 launch.wait_alive(system, alive, list(system.configs), stop)
         if not stop.is_set():
-            page = system.configs["overlay"].console_port and f"open {system.console}, "
-            console.print(f"ready: {page or ''}take off, and fly")
+            page = f"open {system.console}, " if system.configs["overlay"].console_port else ""
+            console.print(f"ready: {page}take off, and fly")
         while not stop.is_set():
             system.check()
             sleep(0.2)
